@@ -1,0 +1,68 @@
+// What enters the estimator: plain structs, SI units, each in its own sensor's frame, stamped with the time of measurement.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "kilvo/sensors/image.hpp"
+#include "kilvo/sensors/time.hpp"
+
+namespace kilvo {
+
+/// Angular rate and specific force in the IMU frame. The acceleration may be in g: the estimator detects it at rest.
+struct ImuSample {
+  Time t{};
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   // rad/s
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  // m/s^2 (or g)
+};
+
+/// Joint encoders (or the two-feet message, whose six positions and velocities come without names).
+struct JointSample {
+  Time t{};
+  std::vector<std::string> names;
+  std::vector<double> position;  // rad
+  std::vector<double> velocity;  // rad/s, may be empty
+  std::vector<double> effort;    // N m, may be empty
+};
+
+struct LidarPoint {
+  float x = 0, y = 0, z = 0;     // m, LiDAR frame
+  float intensity = 0;           // 0..255, sensor's own scale
+  std::int32_t offset_ns = 0;    // time of this point minus LidarScan::t
+};
+
+/// One LiDAR message. Points need not be sorted by time, may be non-finite or at the origin: the estimator drops and counts those.
+struct LidarScan {
+  Time t{};  // the time that the points' offsets refer to
+  std::vector<LidarPoint> points;
+};
+
+struct CameraImage {
+  Time t{};
+  Image image;
+};
+
+using Measurement = std::variant<ImuSample, JointSample, LidarScan, CameraImage>;
+
+enum class Sensor : std::uint8_t { imu, legs, lidar, camera };
+inline constexpr int sensor_count = 4;
+
+/// The name used on the command line and in files: "imu", "legs", "lidar", "camera".
+constexpr const char* name_of(Sensor s) {
+  constexpr const char* names[] = {"imu", "legs", "lidar", "camera"};
+  return names[static_cast<int>(s)];
+}
+
+inline Sensor sensor_of(const Measurement& m) {
+  constexpr Sensor order[] = {Sensor::imu, Sensor::legs, Sensor::lidar, Sensor::camera};
+  return order[m.index()];
+}
+
+inline Time stamp_of(const Measurement& m) {
+  return std::visit([](const auto& x) { return x.t; }, m);
+}
+
+}  // namespace kilvo
