@@ -1,0 +1,133 @@
+#include "kilvo/filter/predict.hpp"
+
+#include <cassert>
+
+namespace kilvo {
+namespace {
+
+// The motion of one interval: rotation R0 -> R1, specific force turned into the world at both ends and taken as linear between.
+struct Motion {
+  double dt;
+  Eigen::Vector3d phi;             // rotation vector of the interval
+  SO3 turn;                        // Exp(phi)
+  SO3 R1;
+  Eigen::Vector3d alpha0, alpha1;  // bias-free specific force in the body at both ends
+  Eigen::Vector3d f0, f1;          // the same in the world
+};
+
+Motion motion_of(const State& x, const ImuInterval& i) {
+  Motion m;
+  m.dt = to_seconds(i.end - i.begin);
+  m.phi = (0.5 * (i.gyro_begin + i.gyro_end) - x.bg) * m.dt;
+  m.turn = SO3::Exp(m.phi);
+  m.R1 = x.R * m.turn;
+  m.alpha0 = i.accel_begin - x.ba;
+  m.alpha1 = i.accel_end - x.ba;
+  m.f0 = x.R * m.alpha0;
+  m.f1 = m.R1 * m.alpha1;
+  return m;
+}
+
+State mean_after(const State& x, const Motion& m) {
+  State y = x;
+  y.R = m.R1;
+  y.p = x.p + m.dt * x.v + m.dt * m.dt * (m.f0 / 3.0 + m.f1 / 6.0 + 0.5 * x.g);
+  y.v = x.v + m.dt * (0.5 * (m.f0 + m.f1) + x.g);
+  return y;
+}
+
+// d(f0)/d(theta), d(f1)/d(theta), d(f1)/d(bg); d(f)/d(ba) = -R.
+struct ForceJacobians {
+  Eigen::Matrix3d f0_theta, f1_theta, f1_bg, Jr;
+};
+
+ForceJacobians jacobians_of(const State& x, const Motion& m) {
+  ForceJacobians j;
+  j.Jr = right_jacobian(m.phi);
+  j.f0_theta = -x.R.matrix() * skew(m.alpha0);
+  const Eigen::Matrix3d turned = m.R1.matrix() * skew(m.alpha1);
+  j.f1_theta = -turned * m.turn.matrix().transpose();
+  j.f1_bg = turned * j.Jr * m.dt;
+  return j;
+}
+
+void add_process_noise(Covariance& P, const Motion& m, const FootOrientations& feet, const ProcessNoise& n, double scale) {
+  const double dt = m.dt;
+  const auto add = [&P](int row, int col, double value) { P.diagonal(col - row).segment<3>(std::min(row, col)).array() += value; };
+  const double accel = scale * n.accel * n.accel;
+  add(at::R, at::R, scale * n.gyro * n.gyro * dt);
+  add(at::v, at::v, accel * dt);
+  add(at::p, at::v, accel * dt * dt / 2);
+  add(at::v, at::p, accel * dt * dt / 2);
+  add(at::p, at::p, accel * dt * dt * dt / 3);
+  add(at::bg, at::bg, n.gyro_bias * n.gyro_bias * dt);
+  add(at::ba, at::ba, n.accel_bias * n.accel_bias * dt);
+  for (int foot = 0; foot < 2; ++foot) {
+    // Isotropic for now in the foot's own axes, so its orientation drops out; a foot that does not stand gets none.
+    if (feet[static_cast<std::size_t>(foot)]) add(at::pcl + 3 * foot, at::pcl + 3 * foot, n.foot * n.foot * dt);
+  }
+  P(at::tau, at::tau) += n.exposure * n.exposure * dt;
+}
+
+}  // namespace
+
+ImuInterval ImuInterval::between(const ImuSample& a, const ImuSample& b, Time begin, Time end) {
+  const double span = to_seconds(b.t - a.t);
+  const double s0 = span > 0 ? to_seconds(begin - a.t) / span : 0.0;
+  const double s1 = span > 0 ? to_seconds(end - a.t) / span : 1.0;
+  return {begin,
+          end,
+          a.gyro + s0 * (b.gyro - a.gyro),
+          a.gyro + s1 * (b.gyro - a.gyro),
+          a.accel + s0 * (b.accel - a.accel),
+          a.accel + s1 * (b.accel - a.accel)};
+}
+
+State predict_mean(const State& x, const ImuInterval& interval) { return mean_after(x, motion_of(x, interval)); }
+
+Estimate predict(const Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise) {
+  assert(interval.begin == e.t && interval.end >= interval.begin);
+  const Motion m = motion_of(e.x, interval);
+  const ForceJacobians j = jacobians_of(e.x, m);
+  const double dt = m.dt, dt2 = dt * dt;
+
+  Estimate out;
+  out.t = interval.end;
+  out.x = mean_after(e.x, m);
+
+  // F differs from the identity only in the rows of R, p, v; M = F P for those nine rows.
+  const Eigen::Matrix3d R_R = m.turn.matrix().transpose();
+  const Eigen::Matrix3d R_bg = -j.Jr * dt;
+  const Eigen::Matrix3d v_R = 0.5 * dt * (j.f0_theta + j.f1_theta);
+  const Eigen::Matrix3d v_bg = 0.5 * dt * j.f1_bg;
+  const Eigen::Matrix3d v_ba = -0.5 * dt * (e.x.R.matrix() + m.R1.matrix());
+  const Eigen::Matrix3d p_R = dt2 * (j.f0_theta / 3.0 + j.f1_theta / 6.0);
+  const Eigen::Matrix3d p_bg = (dt2 / 6.0) * j.f1_bg;
+  const Eigen::Matrix3d p_ba = -dt2 * (e.x.R.matrix() / 3.0 + m.R1.matrix() / 6.0);
+
+  const auto rows = [&e](int block) { return e.P.middleRows<3>(block); };
+  Eigen::Matrix<double, 9, at::size> M;
+  M.middleRows<3>(at::R).noalias() = R_R * rows(at::R) + R_bg * rows(at::bg);
+  M.middleRows<3>(at::p).noalias() = p_R * rows(at::R) + p_bg * rows(at::bg) + p_ba * rows(at::ba);
+  M.middleRows<3>(at::p) += rows(at::p) + dt * rows(at::v) + (0.5 * dt2) * rows(at::g);
+  M.middleRows<3>(at::v).noalias() = v_R * rows(at::R) + v_bg * rows(at::bg) + v_ba * rows(at::ba);
+  M.middleRows<3>(at::v) += rows(at::v) + dt * rows(at::g);
+
+  // M F' for the nine columns that change; the others are M as it is.
+  const auto cols = [&M](int block) { return M.middleCols<3>(block); };
+  Eigen::Matrix<double, 9, 9> N;
+  N.middleCols<3>(at::R).noalias() = cols(at::R) * R_R.transpose() + cols(at::bg) * R_bg.transpose();
+  N.middleCols<3>(at::p).noalias() = cols(at::R) * p_R.transpose() + cols(at::bg) * p_bg.transpose() + cols(at::ba) * p_ba.transpose();
+  N.middleCols<3>(at::p) += cols(at::p) + dt * cols(at::v) + (0.5 * dt2) * cols(at::g);
+  N.middleCols<3>(at::v).noalias() = cols(at::R) * v_R.transpose() + cols(at::bg) * v_bg.transpose() + cols(at::ba) * v_ba.transpose();
+  N.middleCols<3>(at::v) += cols(at::v) + dt * cols(at::g);
+
+  out.P = e.P;
+  out.P.topRightCorner<9, at::size - 9>() = M.rightCols<at::size - 9>();
+  out.P.bottomLeftCorner<at::size - 9, 9>() = M.rightCols<at::size - 9>().transpose();
+  out.P.topLeftCorner<9, 9>() = 0.5 * (N + N.transpose());
+  add_process_noise(out.P, m, feet, noise, interval.noise_scale);
+  return out;
+}
+
+}  // namespace kilvo

@@ -1,0 +1,56 @@
+// State prediction over an IMU interval (paper, Eqs. 2 and 3).
+#pragma once
+
+#include <array>
+#include <optional>
+#include <tuple>
+
+#include "kilvo/filter/state.hpp"
+#include "kilvo/math/field.hpp"
+#include "kilvo/sensors/measurement.hpp"
+
+namespace kilvo {
+
+/// What the IMU said from `begin` to `end`: rate and specific force at both ends (equal when only the latest sample is known).
+struct ImuInterval {
+  Time begin{}, end{};
+  Eigen::Vector3d gyro_begin, gyro_end;    // rad/s
+  Eigen::Vector3d accel_begin, accel_end;  // m/s^2
+  double noise_scale = 1;                  // multiplies the variance of rate and specific force (saturation, gaps)
+
+  /// The latest sample, held.
+  static ImuInterval hold(const ImuSample& s, Time begin, Time end) { return {begin, end, s.gyro, s.gyro, s.accel, s.accel}; }
+  /// Part [begin, end] of the straight line between two samples.
+  static ImuInterval between(const ImuSample& a, const ImuSample& b, Time begin, Time end);
+};
+
+/// Densities of the process noise: what is added to the covariance is the square times dt, so that one setting means one filter at
+/// any rate.
+struct ProcessNoise {
+  double gyro = 4e-4;        // rad/s/sqrt(Hz)
+  double accel = 0.013;      // m/s^2/sqrt(Hz)
+  double gyro_bias = 2e-5;   // rad/s/sqrt(s)
+  double accel_bias = 3e-4;  // m/s^2/sqrt(s)
+  double foot = 0.01;        // m/sqrt(s), of a standing foot, each axis of the foot frame
+  double exposure = 0.05;    // 1/sqrt(s)
+
+  static constexpr auto fields() {
+    return std::tuple{Field{"gyro_noise", &ProcessNoise::gyro, "rad/s/sqrt(Hz)", "noise density of the gyro, aliased impacts included"},
+                      Field{"accel_noise", &ProcessNoise::accel, "m/s^2/sqrt(Hz)", "noise density of the accelerometer, aliased impacts included"},
+                      Field{"gyro_bias_walk", &ProcessNoise::gyro_bias, "rad/s/sqrt(s)", "random walk of the gyro bias"},
+                      Field{"accel_bias_walk", &ProcessNoise::accel_bias, "m/s^2/sqrt(s)", "random walk of the accelerometer bias"},
+                      Field{"foot_noise", &ProcessNoise::foot, "m/sqrt(s)", "random walk of a standing foot"},
+                      Field{"exposure_walk", &ProcessNoise::exposure, "1/sqrt(s)", "random walk of the relative inverse exposure"}};
+  }
+};
+
+/// R_I,foot of each standing foot; none for a foot that does not stand (its contact position is then not in use).
+using FootOrientations = std::array<std::optional<SO3>, 2>;
+
+/// Moves the estimate from interval.begin to interval.end. `e.t` must be interval.begin and the interval not negative.
+Estimate predict(const Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise);
+
+/// The mean alone.
+State predict_mean(const State& x, const ImuInterval& interval);
+
+}  // namespace kilvo

@@ -1,0 +1,40 @@
+#include "kilvo/filter/state.hpp"
+
+namespace kilvo {
+
+State boxplus(const State& x, const ErrorVector& d) {
+  State y;
+  y.R = x.R * SO3::Exp(d.segment<3>(at::R));
+  y.p = x.p + d.segment<3>(at::p);
+  y.v = x.v + d.segment<3>(at::v);
+  y.bg = x.bg + d.segment<3>(at::bg);
+  y.ba = x.ba + d.segment<3>(at::ba);
+  y.g = (x.g + d.segment<3>(at::g)).normalized() * x.g.norm();
+  y.pc[0] = x.pc[0] + d.segment<3>(at::pcl);
+  y.pc[1] = x.pc[1] + d.segment<3>(at::pcr);
+  y.tau = x.tau + d[at::tau];
+  return y;
+}
+
+ErrorVector boxminus(const State& a, const State& b) {
+  ErrorVector d;
+  d.segment<3>(at::R) = (b.R.inverse() * a.R).Log();
+  d.segment<3>(at::p) = a.p - b.p;
+  d.segment<3>(at::v) = a.v - b.v;
+  d.segment<3>(at::bg) = a.bg - b.bg;
+  d.segment<3>(at::ba) = a.ba - b.ba;
+  // The tangent step t at b.g for which b.g + t points along a.g, so that boxplus undoes it exactly.
+  const double squared = b.g.squaredNorm();
+  d.segment<3>(at::g) = squared > 0 ? Eigen::Vector3d(a.g * (squared / a.g.dot(b.g)) - b.g) : Eigen::Vector3d(a.g - b.g);
+  d.segment<3>(at::pcl) = a.pc[0] - b.pc[0];
+  d.segment<3>(at::pcr) = a.pc[1] - b.pc[1];
+  d[at::tau] = a.tau - b.tau;
+  return d;
+}
+
+bool is_finite(const Estimate& e) {
+  return e.x.R.matrix().allFinite() && e.x.p.allFinite() && e.x.v.allFinite() && e.x.bg.allFinite() && e.x.ba.allFinite() && e.x.g.allFinite() &&
+         e.x.pc[0].allFinite() && e.x.pc[1].allFinite() && std::isfinite(e.x.tau) && e.P.allFinite();
+}
+
+}  // namespace kilvo

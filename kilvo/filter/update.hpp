@@ -1,0 +1,85 @@
+// The only Kalman update: iterated, on the manifold, in covariance form (paper, Eqs. 9-10 and the sequential ones; for the Jacobian
+// of the prior: He, Xu, Zhang, "Kalman filters on differentiable manifolds", 2021). Neither the prior covariance nor the information
+// of the measurement is inverted, so both may be singular: a pose that is known, a direction that nobody measures.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <tuple>
+
+#include "kilvo/filter/measurement_rows.hpp"
+#include "kilvo/filter/state.hpp"
+#include "kilvo/math/field.hpp"
+
+namespace kilvo {
+
+struct UpdateConfig {
+  int max_iterations = 5;
+  double rotation_step = 5e-5;  // rad
+  double position_step = 2e-4;  // m
+
+  static constexpr auto fields() {
+    return std::tuple{Field{"max_iterations", &UpdateConfig::max_iterations, "-", "iterations of one update at most"},
+                      Field{"rotation_step", &UpdateConfig::rotation_step, "rad", "an update has converged when its step turns by less"},
+                      Field{"position_step", &UpdateConfig::position_step, "m", "and moves by less"}};
+  }
+};
+
+struct Update {
+  Estimate posterior;
+  int iterations = 0;
+  bool converged = false;
+  int rows = 0;  // after reduction; 0: nothing was measured and the posterior is the prior
+};
+
+/// P seen in the tangent space of an iterate whose rotation is `turned` (rad) away from the prior's: J^-1 P J^-T.
+inline Covariance seen_at_iterate(const Covariance& P, const Eigen::Vector3d& turned) {
+  if (turned.isZero(0)) return P;
+  const Eigen::Matrix3d J_inverse = right_jacobian(turned);
+  Covariance Q = P;
+  Q.middleRows<3>(at::R) = J_inverse * P.middleRows<3>(at::R);
+  Q.middleCols<3>(at::R) = (Q.middleCols<3>(at::R) * J_inverse.transpose()).eval();
+  return Q;
+}
+
+/// `model(iterate, prior covariance)` returns Information<N> (many rows) or Rows<N> (few rows) about the iterate. It may associate and
+/// gate anew at each iterate.
+template <class Model>
+Update update(const Estimate& prior, const Model& model, const UpdateConfig& config) {
+  Update out;
+  out.posterior = prior;
+  State x = prior.x;
+  ErrorVector e = ErrorVector::Zero();  // x [-] prior.x; J^-1 e = e, since Jr(e_R) e_R = e_R
+  for (int k = 1; k <= config.max_iterations; ++k) {
+    const auto measured = model(static_cast<const State&>(x), prior.P);
+    const auto& rows = as_rows(measured);
+    const auto count = rows.r.size();
+    if (count == 0) return {prior, k, false, 0};
+
+    const Covariance P = seen_at_iterate(prior.P, e.segment<3>(at::R));
+    // S = L L', W = P H' L^-T: the gain is W L^-1 and P - W W' is symmetric by construction.
+    auto W = (P * rows.H.transpose()).eval();
+    auto S = (rows.H * W + rows.R).eval();
+    const auto llt = S.llt();
+    if (llt.info() != Eigen::Success) return {prior, k, false, 0};
+    llt.matrixU().template solveInPlace<Eigen::OnTheRight>(W);
+    auto innovation = (rows.r - rows.H * e).eval();
+    llt.matrixL().solveInPlace(innovation);
+    const ErrorVector d = -e - W * innovation;
+
+    x = boxplus(x, d);
+    e = boxminus(x, prior.x);
+    out.iterations = k;
+    out.rows = static_cast<int>(count);
+    out.converged = d.segment<3>(at::R).norm() < config.rotation_step && d.segment<3>(at::p).norm() < config.position_step;
+    if (out.converged || k == config.max_iterations) {
+      out.posterior.P = P;
+      out.posterior.P.template selfadjointView<Eigen::Lower>().rankUpdate(W, -1.0);
+      out.posterior.P.template triangularView<Eigen::StrictlyUpper>() = out.posterior.P.transpose();
+      break;
+    }
+  }
+  out.posterior.x = x;
+  return out;
+}
+
+}  // namespace kilvo
