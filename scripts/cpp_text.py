@@ -1,0 +1,133 @@
+"""Reads C++ source well enough for the checks of this folder: no comments or strings in the way, and which brace opens what."""
+import os
+import re
+from typing import Iterator, NamedTuple
+
+FLOORS = ("kilvo", "lab", "apps", "tests", "bench")
+TEST_SUFFIXES = ("_test.cpp", "_fuzz.cpp")
+
+
+def sources(root: str) -> Iterator[str]:
+    """Every *.hpp and *.cpp of the project as a path relative to `root`, sorted."""
+    for floor in FLOORS:
+        for folder, folders, files in os.walk(os.path.join(root, floor)):
+            folders.sort()
+            for name in sorted(files):
+                if name.endswith((".hpp", ".cpp")):
+                    yield os.path.relpath(os.path.join(folder, name), root)
+
+
+def is_test(path: str) -> bool:
+    return path.endswith(TEST_SUFFIXES) or path.startswith("tests/")
+
+
+def read(root: str, path: str) -> str:
+    with open(os.path.join(root, path), encoding="utf-8") as file:
+        return file.read()
+
+
+_LEXEME = re.compile(
+    r"""(?P<line>//(?:\\\n|[^\n])*)
+      | (?P<block>/\*.*?\*/)
+      | (?P<raw>R"(?P<tag>[^()\\\s]{0,16})\(.*?\)(?P=tag)")
+      | (?P<string>"(?:\\.|[^"\\\n])*")
+      | (?P<number>\b\d(?:'?[\w.])*)
+      | (?P<char>'(?:\\.|[^'\\\n])+')""",
+    re.X | re.S)
+
+
+def without_comments(text: str, keep_strings: bool = False) -> str:
+    """`text` with comments blanked (and, unless `keep_strings`, the inside of strings); every line keeps its number."""
+
+    def blank(match: re.Match) -> str:
+        lexeme = match.group()
+        if match["number"] or (keep_strings and not (match["line"] or match["block"])):
+            return lexeme
+        hole = re.sub(r"[^\n]", " ", lexeme)
+        return hole if match["line"] or match["block"] else '"' + hole[1:-1] + '"'
+
+    return _LEXEME.sub(blank, text)
+
+
+class Scope(NamedTuple):
+    kind: str   # namespace, type, function
+    head: str   # what stands before the brace, on one line
+    first: int  # line on which the head begins
+    last: int   # line of the closing brace
+
+
+class Statement(NamedTuple):
+    scope: str  # kind of the scope around it: namespace, type or function
+    text: str
+    line: int
+
+
+_VALUE = "\x02"  # stands for a braced value once it is closed
+
+
+def _without_preprocessor(text: str) -> str:
+    return re.sub(r"^[ \t]*#(?:\\\n|[^\n])*", lambda m: re.sub(r"[^\n]", " ", m.group()), text, flags=re.M)
+
+
+def _flat(head: str) -> str:
+    """`head` on one line: no template arguments, no operator symbols, every bracket and braced value written ()."""
+    head = re.sub(r"\boperator\s*(\(\s*\)|[^\s\w(]+)", "operator_ ", " ".join(head.split())).replace(_VALUE, "()")
+    before = None
+    while before != head:
+        before = head
+        head = re.sub(r"\((?:[^()]|\(\))+\)", "()", re.sub(r"<(?:[^<>()]|\(\))*>", "", head))
+    return head.strip()
+
+
+def _opens(head: str) -> str:
+    """What a brace after `head` opens in a namespace or a type: namespace, type, function or value."""
+    flat = _flat(head)
+    if re.search(r"\bnamespace\b[\w:\s]*$|\bextern\s*\"\s*\"$", flat):
+        return "namespace"
+    if re.search(r"\b(class|struct|union|enum)\b", flat) and not re.search(r"\w\s*\(\)$", re.sub(r"alignas\s*\(\)", "", flat)):
+        return "type"
+    if "=" in flat or "()" not in flat:
+        return "value"
+    after = flat[flat.rindex("()") + 2:].replace("::", "")
+    if re.search(r"[:,]\s*\w+$", after) and "->" not in after:
+        return "value"  # a member initialiser: T() : a_{1} {
+    return "function"
+
+
+def scan(text: str) -> Iterator[Scope | Statement]:
+    """The scopes of `text`, each as it closes, and the statements that stand in a namespace, a type or a function."""
+    text = _without_preprocessor(without_comments(text))
+    stack: list[tuple[str, str, int, int]] = []  # kind, and what to go back to: head, its first line, open brackets
+    head, first, brackets, line = "", 0, 0, 1
+
+    def here() -> str:
+        return stack[-1][0] if stack else "namespace"
+
+    for char in text:
+        line += char == "\n"
+        if not head.strip() and not char.isspace():
+            first = line
+        if char == "{":
+            if here() in ("function", "value"):
+                kind = here()  # whatever it is, it belongs to the function or value around it
+            else:
+                kind = "value" if brackets else _opens(head)
+            nested = kind == here() and kind == "function"
+            stack.append((kind, "" if nested else head, 0 if nested else first, brackets))
+            head, brackets = "", 0
+        elif char == "}" and stack:
+            kind, old_head, old_first, brackets = stack.pop()
+            head = ""
+            if kind == "value":
+                head, first = old_head + _VALUE, old_first
+            elif old_first:
+                yield Scope(kind, " ".join(old_head.split()), old_first, line)
+        elif char == ";" and (not brackets or here() == "function"):
+            if here() != "value":
+                yield Statement(here(), " ".join(head.replace(_VALUE, "{}").split()), first)
+                head = ""
+        elif char == ":" and head.strip() in ("public", "protected", "private"):
+            head = ""
+        else:
+            brackets += (char in "([") - (char in ")]")
+            head += char
