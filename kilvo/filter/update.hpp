@@ -44,7 +44,7 @@ inline Covariance seen_at_iterate(const Covariance& P, const Eigen::Vector3d& tu
 /// `model(iterate, prior covariance)` returns Information<N> (many rows) or Rows<N> (few rows) about the iterate. It may associate and
 /// gate anew at each iterate.
 template <class Model>
-Update update(const Estimate& prior, const Model& model, const UpdateConfig& config) {
+Update update(const Estimate& prior, Model&& model, const UpdateConfig& config) {
   Update out;
   out.posterior = prior;
   State x = prior.x;

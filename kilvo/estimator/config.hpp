@@ -1,0 +1,53 @@
+// Settings of the estimator and of all that it conducts.
+#pragma once
+
+#include <tuple>
+
+#include "kilvo/filter/predict.hpp"
+#include "kilvo/filter/update.hpp"
+#include "kilvo/lidar/lidar_config.hpp"
+#include "kilvo/map/voxel_map.hpp"
+#include "kilvo/math/field.hpp"
+
+namespace kilvo {
+
+struct InitialConfig {
+  double still_time = 0.5;        // s
+  double moving_start = 3.0;      // s
+  double still_gyro = 0.03;       // rad/s
+  double still_accel = 0.4;       // m/s^2
+  double gravity_sigma = 0.05;    // m/s^2
+  double gyro_bias_sigma = 5e-4;  // rad/s
+  double velocity_sigma = 0.01;   // m/s
+
+  static constexpr auto fields() {
+    return std::tuple{
+        Field{"still_time", &InitialConfig::still_time, "s", "how long the robot must stand still to start"},
+        Field{"moving_start", &InitialConfig::moving_start, "s", "after so long without standing still it starts moving, with wide uncertainties"},
+        Field{"still_gyro", &InitialConfig::still_gyro, "rad/s", "standing still: standard deviation of the angular rate below this"},
+        Field{"still_accel", &InitialConfig::still_accel, "m/s^2", "standing still: standard deviation of the acceleration below this"},
+        Field{"gravity_sigma", &InitialConfig::gravity_sigma, "m/s^2", "how far the accelerometer bias may tilt the first gravity, each way"},
+        Field{"gyro_bias_sigma", &InitialConfig::gyro_bias_sigma, "rad/s", "uncertainty of the gyro bias measured at rest"},
+        Field{"velocity_sigma", &InitialConfig::velocity_sigma, "m/s", "uncertainty of the velocity at rest"}};
+  }
+};
+
+struct EstimatorConfig {
+  double max_wait = 0.2;      // s
+  double max_imu_gap = 0.1;   // s
+  bool gravity_align = true;
+
+  InitialConfig initial;
+  ProcessNoise noise;
+  UpdateConfig update;
+  MapConfig map;
+  LidarConfig lidar;
+
+  static constexpr auto fields() {
+    return std::tuple{Field{"max_wait", &EstimatorConfig::max_wait, "s", "how long, in data time, a measurement waits for others of earlier stamps"},
+                      Field{"max_imu_gap", &EstimatorConfig::max_imu_gap, "s", "a longer gap between IMU samples is bridged with wide uncertainties"},
+                      Field{"gravity_align", &EstimatorConfig::gravity_align, "-", "z of the world is up; false: the world is the first IMU frame"}};
+  }
+};
+
+}  // namespace kilvo

@@ -1,0 +1,71 @@
+// The conductor: measurements in, states out. Values only: it never throws after construction, never prints, never asks the time.
+#pragma once
+
+#include <array>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kilvo/estimator/config.hpp"
+#include "kilvo/estimator/initialise.hpp"
+#include "kilvo/estimator/output.hpp"
+#include "kilvo/estimator/timeline.hpp"
+#include "kilvo/filter/trajectory.hpp"
+#include "kilvo/map/voxel_map.hpp"
+#include "kilvo/sensors/robot.hpp"
+
+namespace kilvo {
+
+class Estimator {
+ public:
+  /// `used`: which sensors will be pushed, by Sensor; others are ignored and counted. Throws std::invalid_argument when a setting makes
+  /// no sense (its name is in the text).
+  Estimator(const Robot& robot, const EstimatorConfig& config, std::array<bool, sensor_count> used);
+
+  /// Takes a measurement in the order of its arrival; returns what became known, in time order.
+  std::vector<Output> push(Measurement m);
+
+  /// No more measurements will come: what still waits is processed.
+  std::vector<Output> finish();
+
+  const Statistics& statistics() const { return statistics_; }
+  const VoxelMap& map() const { return map_; }
+  bool initialised() const { return estimate_.has_value(); }
+  /// What it waits for before the first output; empty afterwards.
+  std::string waiting_for() const { return initialised() ? std::string() : initialiser_.waiting_for(); }
+
+ private:
+  void handle(Measurement& m, std::vector<Output>& out);
+  void handle_imu(ImuSample s, std::vector<Output>& out);
+  void handle_before_start(Measurement& m, std::vector<Output>& out);
+  void begin(const Start& start, std::vector<Output>& out);
+  void advance(const ImuSample& from, const ImuSample& to, Time until);
+  void process(LidarScan scan, Time end, std::vector<Output>& out);
+  void bound_pending();
+  bool keep_finite();
+  void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
+  Output output_now() const;
+
+  Robot robot_;
+  EstimatorConfig config_;
+  std::array<bool, sensor_count> used_;
+  Timeline timeline_;
+  Initialiser initialiser_;
+  std::deque<Measurement> before_start_;
+  double accel_scale_ = 1;
+
+  std::optional<Estimate> estimate_;
+  Estimate good_;  // the last one that passed the check, after a sweep
+  std::optional<ImuSample> last_imu_;
+  struct PendingScan {
+    LidarScan scan;
+    Time end;
+  };
+  std::deque<PendingScan> pending_;
+  Trajectory trajectory_;
+  VoxelMap map_;
+  Statistics statistics_;
+};
+
+}  // namespace kilvo

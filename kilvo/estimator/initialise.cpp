@@ -1,0 +1,106 @@
+#include "kilvo/estimator/initialise.hpp"
+
+#include <cmath>
+#include <numbers>
+
+namespace kilvo {
+namespace {
+
+struct Statistics3 {
+  Eigen::Vector3d mean, sigma;
+};
+
+template <class Member>
+Statistics3 statistics_of(const std::deque<ImuSample>& window, Member member) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), squares = Eigen::Vector3d::Zero();
+  for (const ImuSample& s : window) sum += s.*member;
+  const Eigen::Vector3d mean = sum / static_cast<double>(window.size());
+  for (const ImuSample& s : window) squares += (s.*member - mean).cwiseAbs2();
+  return {mean, (squares / static_cast<double>(window.size())).cwiseSqrt()};
+}
+
+// The resting norm is near 1: the unit is g. Rescaling to the exact norm would hide the bias, so only the unit is changed.
+double unit_of(double resting_norm) { return std::abs(resting_norm - 1.0) < 0.1 ? standard_gravity : 1.0; }
+
+// What is known exactly still gets this much, so that the covariance stays positive definite: 10 micrometres, 10 microradians.
+constexpr double floor_variance = 1e-10;
+
+}  // namespace
+
+SO3 level(const Eigen::Vector3d& up_I) {
+  const Eigen::Vector3d z = up_I.normalized();
+  const bool x_is_vertical = std::abs(z.x()) > std::cos(10.0 * std::numbers::pi / 180.0);
+  const Eigen::Vector3d forward = x_is_vertical ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d x = (forward - forward.dot(z) * z).normalized();
+  Eigen::Matrix3d R;
+  R.row(0) = x;
+  R.row(1) = z.cross(x);
+  R.row(2) = z;
+  return SO3::nearest(R);
+}
+
+std::string Initialiser::waiting_for() const {
+  if (window_.empty()) return "waiting for the first IMU sample";
+  return "waiting for the robot to stand still for " + std::to_string(config_.still_time) + " s";
+}
+
+std::optional<Start> Initialiser::add(const ImuSample& s) {
+  if (!first_) first_ = s.t;
+  window_.push_back(s);
+  // The shortest run of samples that spans still_time.
+  while (window_.size() > 2 && s.t - window_[1].t >= from_seconds(config_.still_time)) window_.pop_front();
+  constexpr std::size_t min_samples = 20;
+  if (s.t - window_.front().t < from_seconds(config_.still_time) || window_.size() < min_samples) return std::nullopt;
+
+  const auto gyro = statistics_of(window_, &ImuSample::gyro);
+  const auto accel = statistics_of(window_, &ImuSample::accel);
+  const double unit = unit_of(accel.mean.norm());
+  constexpr double largest_gyro_bias = 0.1;  // rad/s
+  const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && gyro.mean.norm() < largest_gyro_bias && accel.sigma.maxCoeff() * unit < config_.still_accel;
+  if (still) return start(true);
+  if (s.t - *first_ >= from_seconds(config_.moving_start)) return start(false);
+  return std::nullopt;
+}
+
+Start Initialiser::start(bool still) const {
+  const Eigen::Vector3d gyro = statistics_of(window_, &ImuSample::gyro).mean;
+  Eigen::Vector3d accel = statistics_of(window_, &ImuSample::accel).mean;
+  Start out;
+  out.still = still;
+  out.resting_norm = accel.norm();
+  out.accel_scale = unit_of(accel.norm());
+  accel *= out.accel_scale;
+  const Eigen::Vector3d up_I = accel.norm() > 1e-6 ? Eigen::Vector3d(accel.normalized()) : Eigen::Vector3d::UnitZ();
+
+  Estimate& e = out.estimate;
+  e.t = still ? window_.front().t : window_.back().t;
+  if (gravity_align_) e.x.R = level(up_I);
+  const Eigen::Vector3d up_W = e.x.R * up_I;
+  e.x.g = -standard_gravity * up_W;
+
+  // The world is fixed by the first pose. Gravity carries the tilt: two directions, and at rest the accelerometer bias turns with it.
+  const double tilt = still ? config_.gravity_sigma : 1.0;
+  const Eigen::Matrix3d horizontal = Eigen::Matrix3d::Identity() - up_W * up_W.transpose();
+  const Eigen::Matrix3d gravity = tilt * tilt * horizontal;
+  const Eigen::Matrix3d Rt = e.x.R.matrix().transpose();
+  e.P.setZero();
+  e.P.diagonal().setConstant(floor_variance);
+  e.P.block<3, 3>(at::g, at::g) += gravity;
+  if (still) {
+    e.x.bg = gyro;
+    e.x.ba = (accel.norm() - standard_gravity) * up_I;
+    constexpr double unknown_gravity = 0.02;  // m/s^2, how much gravity differs between places
+    e.P.block<3, 3>(at::ba, at::ba) += Rt * gravity * Rt.transpose() + unknown_gravity * unknown_gravity * up_I * up_I.transpose() + 1e-6 * Eigen::Matrix3d::Identity();
+    e.P.block<3, 3>(at::ba, at::g) = Rt * gravity;
+    e.P.block<3, 3>(at::g, at::ba) = gravity * Rt.transpose();
+    e.P.diagonal().segment<3>(at::bg).array() += config_.gyro_bias_sigma * config_.gyro_bias_sigma;
+    e.P.diagonal().segment<3>(at::v).array() += config_.velocity_sigma * config_.velocity_sigma;
+  } else {
+    e.P.diagonal().segment<3>(at::ba).array() += 0.1 * 0.1;
+    e.P.diagonal().segment<3>(at::bg).array() += 0.02 * 0.02;
+    e.P.diagonal().segment<3>(at::v).array() += 1.0;
+  }
+  return out;
+}
+
+}  // namespace kilvo

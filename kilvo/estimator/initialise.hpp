@@ -1,0 +1,44 @@
+// The first estimate: gravity, gyro bias and the unit of the accelerometer from a robot that stands still; failing that, a moving start.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "kilvo/estimator/config.hpp"
+#include "kilvo/filter/state.hpp"
+#include "kilvo/sensors/measurement.hpp"
+
+namespace kilvo {
+
+struct Start {
+  Estimate estimate;        // at the first sample of the still window, or at the last sample of a moving start
+  double accel_scale = 1;   // from the IMU's unit to m/s^2
+  bool still = true;
+  double resting_norm = 0;  // of the accelerometer, in its own unit
+};
+
+class Initialiser {
+ public:
+  Initialiser(const InitialConfig& config, bool gravity_align) : config_(config), gravity_align_(gravity_align) {}
+
+  /// The start, as soon as there is one. Samples must be finite and in time order.
+  std::optional<Start> add(const ImuSample& s);
+
+  /// What it waits for, in words.
+  std::string waiting_for() const;
+
+ private:
+  Start start(bool still) const;
+
+  InitialConfig config_;
+  bool gravity_align_;
+  std::deque<ImuSample> window_;
+  std::optional<Time> first_;
+};
+
+/// R_WI with z of the world along `up_I` and x along the horizontal part of the IMU's x axis (of its y axis when x is within 10 degrees
+/// of the vertical).
+SO3 level(const Eigen::Vector3d& up_I);
+
+}  // namespace kilvo

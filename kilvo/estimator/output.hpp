@@ -1,0 +1,50 @@
+// What the world gets: one for each IMU sample and each sweep.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "kilvo/estimator/modality.hpp"
+#include "kilvo/filter/state.hpp"
+#include "kilvo/lidar/point_to_plane.hpp"
+#include "kilvo/sensors/measurement.hpp"
+
+namespace kilvo {
+
+/// Where the time of a sweep went. Measured, never decided upon.
+struct StageTimes {
+  double lidar_us = 0;  // undistortion to the end of the update
+  double map_us = 0;    // insertion
+  double other_us = 0;  // the rest of the sweep
+};
+
+struct Output {
+  Time t{};
+  State x;
+  Covariance P = Covariance::Zero();  // of the error relative to the first pose (state.hpp: at)
+  Modality modality = Modality::coast;
+  bool is_sweep = false;              // state after the last update of a sweep
+  // Only of sweeps:
+  std::vector<PointXYZI> points_W;    // undistorted, in the world
+  RegistrationReport registration;
+  StageTimes stages;
+};
+
+/// What happened to the measurements of one sensor.
+struct SensorCount {
+  std::uint64_t used = 0;
+  std::map<std::string, std::uint64_t> dropped;  // cause -> messages
+};
+
+struct Statistics {
+  std::array<SensorCount, sensor_count> sensors;  // by Sensor
+  PointDrops points;                              // LiDAR points not used, by cause
+  std::uint64_t rollbacks = 0;                    // a non-finite state was thrown away
+  bool diverged = false;
+  std::vector<std::string> warnings;              // each said once
+};
+
+}  // namespace kilvo

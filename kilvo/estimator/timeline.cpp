@@ -1,0 +1,44 @@
+#include "kilvo/estimator/timeline.hpp"
+
+#include <algorithm>
+
+namespace kilvo {
+
+Time completion_of(const Measurement& m) {
+  const auto* scan = std::get_if<LidarScan>(&m);
+  if (scan == nullptr || scan->points.empty()) return stamp_of(m);
+  std::int32_t last = scan->points.front().offset_ns;
+  for (const LidarPoint& p : scan->points) last = std::max(last, p.offset_ns);
+  return scan->t + Duration(last);
+}
+
+std::optional<std::string> Timeline::push(Measurement m) {
+  const Time key = completion_of(m), stamp = stamp_of(m);
+  const auto s = static_cast<std::size_t>(sensor_of(m));
+  if (stamp_[s] == stamp) return "duplicate";
+  if (released_ && key < *released_) return "late";
+  if (!newest_[s] || key > *newest_[s]) {
+    newest_[s] = key;
+    stamp_[s] = stamp;
+  }
+  newest_of_all_ = std::max(newest_of_all_.value_or(key), key);
+  waiting_.emplace(std::pair(key, sequence_++), std::move(m));
+  return std::nullopt;
+}
+
+bool Timeline::may_go(Time key) const {
+  if (ended_ || *newest_of_all_ - key >= max_wait_) return true;
+  for (std::size_t s = 0; s < sensor_count; ++s) {
+    if (expected_[s] && (!newest_[s] || *newest_[s] < key)) return false;
+  }
+  return true;
+}
+
+std::optional<Measurement> Timeline::pop() {
+  if (waiting_.empty() || !may_go(waiting_.begin()->first.first)) return std::nullopt;
+  auto first = waiting_.extract(waiting_.begin());
+  released_ = first.key().first;
+  return std::move(first.mapped());
+}
+
+}  // namespace kilvo

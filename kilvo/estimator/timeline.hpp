@@ -1,0 +1,45 @@
+// Puts measurements into the order of their stamps. A measurement is released when every expected sensor has been heard beyond it, or
+// when it has waited max_wait of data time.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "kilvo/sensors/measurement.hpp"
+
+namespace kilvo {
+
+/// When a measurement is complete: a scan at its last point, anything else at its stamp.
+Time completion_of(const Measurement& m);
+
+class Timeline {
+ public:
+  Timeline(std::array<bool, sensor_count> expected, Duration max_wait) : expected_(expected), max_wait_(max_wait) {}
+
+  /// Takes the measurement, or says why not ("late", "duplicate").
+  std::optional<std::string> push(Measurement m);
+
+  /// The next measurement in order, if it need not wait.
+  std::optional<Measurement> pop();
+
+  /// From now on nothing waits: the recording has ended.
+  void end() { ended_ = true; }
+
+ private:
+  bool may_go(Time key) const;
+
+  std::array<bool, sensor_count> expected_;
+  std::array<std::optional<Time>, sensor_count> newest_;
+  std::array<std::optional<Time>, sensor_count> stamp_;  // of the newest
+  std::optional<Time> released_, newest_of_all_;
+  std::map<std::pair<Time, std::uint64_t>, Measurement> waiting_;  // by completion, then by arrival
+  std::uint64_t sequence_ = 0;
+  Duration max_wait_;
+  bool ended_ = false;
+};
+
+}  // namespace kilvo

@@ -1,0 +1,139 @@
+#include "kilvo/lidar/point_to_plane.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kilvo/lidar/point_noise.hpp"
+
+namespace kilvo {
+namespace {
+
+// A cluster thicker than its noise explains lies on two surfaces: its mean lies on neither.
+constexpr double thickness_sigmas2 = 6.0;
+
+// The thickness test needs a few points to say anything.
+constexpr float thickness_min_count = 4;
+
+}  // namespace
+
+PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, const Eigen::Vector3d& n_W, const Eigen::Vector3d& q_W) {
+  PointToPlaneRow row;
+  const Eigen::Vector3d n_I = T_WI.R.matrix().transpose() * n_W;
+  row.r = n_W.dot(T_WI * p_I - q_W);
+  row.J.head<3>() = p_I.cross(n_I);
+  row.J.tail<3>() = n_W;
+  return row;
+}
+
+LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const LidarConfig& config)
+    : map_(map), clusters_(clusters), p_IL_(p_IL), config_(config), associations_(clusters.size()), rows_of_node_(map.node_capacity(), 0) {}
+
+bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P, Association& out) const {
+  const Plane& plane = *match.plane;
+  const Eigen::Vector3d p_I = cluster.mean.cast<double>();
+  const Eigen::Vector3d n_W = plane.normal.cast<double>();
+  const PointToPlaneRow row = point_to_plane(T_WI, p_I, n_W, plane.centre);
+  const Eigen::Vector3d n_I = T_WI.R.matrix().transpose() * n_W;
+  const double sensor = point_noise_along(n_I, p_I - p_IL_, config_);
+  const double rough = static_cast<double>(plane.roughness_variance);
+  const double variance = sensor / static_cast<double>(cluster.count) + rough;
+  const double plane_variance = plane.variance_at(T_WI * p_I);
+  const double gate = variance + plane_variance + row.J.dot(P * row.J);
+  if (row.r * row.r > config_.gate * config_.gate * gate) return false;
+  if (cluster.count >= thickness_min_count) {
+    const Eigen::Vector3f n = n_I.cast<float>();
+    const double thickness = static_cast<double>(n.dot(cluster.scatter_matrix() * n) / cluster.count);
+    if (thickness > thickness_sigmas2 * (sensor + rough)) return false;
+  }
+  out = {&plane, match.node, variance, plane_variance, row};
+  return true;
+}
+
+LidarModel::Association LidarModel::associate(const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P) {
+  Association found;
+  bool seen = false;
+  const auto try_at = [&](const Eigen::Vector3d& x) {
+    return map_.visit_planes(x, [&](const VoxelMap::Match& m) {
+      seen = true;
+      return accept(m, cluster, T_WI, P, found);
+    });
+  };
+  const Eigen::Vector3d x = T_WI * cluster.mean.cast<double>();
+  if (try_at(x)) return found;
+  // The nearest neighbour leaf: across the face that the point is closest to.
+  const double leaf = map_.leaf_size();
+  Eigen::Vector3d offset;
+  for (int i = 0; i < 3; ++i) offset[i] = x[i] - (static_cast<double>(fast_floor(x[i] / leaf)) + 0.5) * leaf;
+  int axis = 0;
+  offset.cwiseAbs().maxCoeff(&axis);
+  Eigen::Vector3d beside = x;
+  beside[axis] += offset[axis] > 0 ? leaf : -leaf;
+  try_at(beside);
+  report_.rejected += seen && found.plane == nullptr ? 1 : 0;
+  return found;
+}
+
+Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
+  const SE3 T_WI = x.pose();
+  const PoseCovariance P = prior.topLeftCorner<6, 6>();
+  report_.clusters = static_cast<int>(clusters_.size());
+  report_.matched = report_.rejected = 0;
+  for (std::size_t i = 0; i < clusters_.size(); ++i) {
+    Association& a = associations_[i];
+    a = associate(clusters_[i], T_WI, P);
+    if (a.plane != nullptr) ++rows_of_node_[a.node];
+  }
+
+  Information<6> info;
+  info.columns = {at::R, at::R + 1, at::R + 2, at::p, at::p + 1, at::p + 2};
+  Eigen::Matrix<double, 6, 6> fake = Eigen::Matrix<double, 6, 6>::Zero();
+  for (std::size_t i = 0; i < associations_.size(); ++i) {
+    const Association& a = associations_[i];
+    if (a.plane == nullptr) continue;
+    // k rows of one plane share its error: each carries k times its variance, so that together they average it not at all.
+    const double weight = 1.0 / (a.variance + rows_of_node_[a.node] * a.plane_variance);
+    info.A.selfadjointView<Eigen::Lower>().rankUpdate(a.row.J, weight);
+    info.b += weight * a.row.r * a.row.J;
+    info.chi2 += weight * a.row.r * a.row.r;
+    ++info.rows;
+    if (first_) {
+      const Eigen::Vector3d p_I = clusters_[i].mean.cast<double>();
+      const Eigen::Vector3f u = a.plane->axis, w = a.plane->normal.cross(a.plane->axis);
+      for (const auto& [axis, variance] : {std::pair(u, a.plane->tilt_variance_1), std::pair(w, a.plane->tilt_variance_2)}) {
+        Eigen::Matrix<double, 6, 1> g;
+        g.tail<3>() = axis.cast<double>();
+        g.head<3>() = p_I.cross(T_WI.R.matrix().transpose() * g.tail<3>());
+        fake.selfadjointView<Eigen::Lower>().rankUpdate(g, weight * static_cast<double>(variance));
+      }
+    }
+  }
+  info.A.triangularView<Eigen::StrictlyUpper>() = info.A.transpose();
+  fake.triangularView<Eigen::StrictlyUpper>() = fake.transpose();
+  for (const Association& a : associations_) {
+    if (a.plane != nullptr) rows_of_node_[a.node] = 0;
+  }
+  report_.matched = info.rows;
+  report_.chi2_per_row = info.rows > 0 ? info.chi2 / info.rows : 0;
+  if (first_) report_.degeneracy = find_degeneracy(info.A, fake, config_.weak_direction);
+  first_ = false;
+  project_out(report_.degeneracy, info);
+  return info;
+}
+
+std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL, const LidarConfig& config) {
+  std::vector<PointGroup> groups;
+  groups.reserve(clusters.size());
+  const Eigen::Matrix3d& R = T_WI.R.matrix();
+  for (const PointCluster& c : clusters) {
+    PointGroup g;
+    const Eigen::Vector3d p_I = c.mean.cast<double>();
+    g.mean = T_WI * p_I;
+    g.count = static_cast<double>(c.count);
+    g.scatter = R * c.scatter_matrix().cast<double>() * R.transpose();
+    g.noise = point_noise(R * (p_I - p_IL), config);
+    groups.push_back(g);
+  }
+  return groups;
+}
+
+}  // namespace kilvo

@@ -1,0 +1,66 @@
+// The LiDAR measurement (paper, Eq. 11): clusters of undistorted points against the planes of the voxel map.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "kilvo/filter/measurement_rows.hpp"
+#include "kilvo/lidar/degeneracy.hpp"
+#include "kilvo/lidar/downsample.hpp"
+#include "kilvo/lidar/lidar_config.hpp"
+#include "kilvo/map/voxel_map.hpp"
+
+namespace kilvo {
+
+/// One row: r = n'(R p + t - q), J = dr/d(theta, t) = [(p x R'n)', n'].
+struct PointToPlaneRow {
+  double r = 0;                                                            // m
+  Eigen::Matrix<double, 6, 1> J = Eigen::Matrix<double, 6, 1>::Zero();     // over (rotation, position)
+};
+PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, const Eigen::Vector3d& n_W, const Eigen::Vector3d& q_W);
+
+/// What the last evaluation used.
+struct RegistrationReport {
+  int clusters = 0;          // of the sweep
+  int matched = 0;           // rows used
+  int rejected = 0;          // had a plane but failed the gate
+  double chi2_per_row = 0;
+  Degeneracy degeneracy;
+};
+
+/// The model that `update` calls: at each iterate it looks the planes up anew, gates, and sums the rows.
+class LidarModel {
+ public:
+  /// Keeps references: the map and the clusters must outlive it.
+  LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const LidarConfig& config);
+
+  Information<6> operator()(const State& x, const Covariance& prior);
+
+  const RegistrationReport& report() const { return report_; }
+
+ private:
+  struct Association {
+    const Plane* plane = nullptr;
+    std::uint32_t node = 0;
+    double variance = 0;         // of the cluster's mean along the normal: measurement and roughness, m^2
+    double plane_variance = 0;   // of the plane under it, common to all clusters of the plane, m^2
+    PointToPlaneRow row;
+  };
+
+  Association associate(const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P);
+  bool accept(const VoxelMap::Match& match, const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P, Association& out) const;
+
+  const VoxelMap& map_;
+  std::span<const PointCluster> clusters_;
+  Eigen::Vector3d p_IL_;
+  LidarConfig config_;
+  std::vector<Association> associations_;
+  std::vector<std::uint16_t> rows_of_node_;
+  bool first_ = true;
+  RegistrationReport report_;
+};
+
+/// The clusters as groups of points in the world, for VoxelMap::insert.
+std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL, const LidarConfig& config);
+
+}  // namespace kilvo

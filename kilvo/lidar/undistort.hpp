@@ -1,0 +1,26 @@
+// Turns the points of a scan, each taken at its own time on the move, into points seen from one pose.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "kilvo/filter/trajectory.hpp"
+#include "kilvo/sensors/measurement.hpp"
+#include "kilvo/sensors/robot.hpp"
+
+namespace kilvo {
+
+/// x, y, z in metres and intensity.
+using PointXYZI = Eigen::Vector4f;
+
+/// Points that were not used, by cause.
+struct PointDrops {
+  std::uint32_t non_finite = 0, at_origin = 0, too_near = 0, too_far = 0, outside_trajectory = 0;
+};
+
+/// A scan's points in the IMU frame of time `at`, by their relative motion along `trajectory`; both ends of the scan and `at` should
+/// lie within it. Points without a pose (up to `slack` outside is taken as the end pose) are dropped and counted.
+std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajectory, Time at, const LidarMount& mount, PointDrops& drops);
+
+}  // namespace kilvo

@@ -1,0 +1,134 @@
+// The map that LiDAR, vision and contact share: a hash of root voxels, each an octree of depth two that subdivides where its points
+// do not lie on one plane. Nodes keep moments, not points, so a node costs the same however often it is seen.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "kilvo/map/plane.hpp"
+#include "kilvo/map/voxel_index.hpp"
+#include "kilvo/math/field.hpp"
+
+namespace kilvo {
+
+struct MapConfig {
+  double voxel_size = 1.0;       // m
+  double min_points = 8;
+  double max_roughness = 0.03;   // m
+  double full_points = 2000;
+  double radius = 120;           // m
+  int max_nodes = 600000;
+
+  static constexpr auto fields() {
+    return std::tuple{
+        Field{"voxel_size", &MapConfig::voxel_size, "m", "edge of a root voxel; it is halved twice where its points lie on no plane"},
+        Field{"min_points", &MapConfig::min_points, "-", "fewer points make no plane"},
+        Field{"max_roughness", &MapConfig::max_roughness, "m", "a surface that leaves its plane by more than this standard deviation, measurement noise apart, is no plane"},
+        Field{"full_points", &MapConfig::full_points, "-", "a plane of this many points is settled and takes no more"},
+        Field{"radius", &MapConfig::radius, "m", "voxels farther from the robot are forgotten"},
+        Field{"max_nodes", &MapConfig::max_nodes, "-", "octree nodes at most; the farthest voxels are forgotten first"}};
+  }
+};
+
+class VoxelMap {
+ public:
+  explicit VoxelMap(const MapConfig& config);
+
+  /// A plane under a point and the node that holds it (equal ids: the same plane, so the same error).
+  struct Match {
+    const Plane* plane = nullptr;
+    std::uint32_t node = 0;
+  };
+
+  /// Calls f(Match) for each plane whose voxel holds x, from the root voxel down to the sub-voxel, until f returns true.
+  template <class F>
+  bool visit_planes(const Eigen::Vector3d& x, F&& f) const;
+
+  /// The largest voxel that holds x and is a plane.
+  const Plane* plane_at(const Eigen::Vector3d& x) const;
+
+  /// Adds groups of points in the world; each must fit within one leaf (edge leaf_size()). Planes are refitted as they grow.
+  void insert(std::span<const PointGroup> groups);
+
+  /// Forgets voxels beyond the radius around `centre`, and the farthest ones while there are more than max_nodes.
+  void forget(const Eigen::Vector3d& centre);
+
+  double leaf_size() const { return config_.voxel_size / 4; }
+  bool empty() const { return roots_.size() == 0; }
+  std::size_t node_count() const { return node_count_; }
+  /// Above every node id that a Match can have now.
+  std::size_t node_capacity() const { return nodes_.used; }
+  std::size_t memory_bytes() const;
+  static std::size_t bytes_per_node();
+
+ private:
+  static constexpr std::uint32_t none = VoxelIndex::none;
+  static constexpr std::size_t block_size = 1024;
+
+  struct Node {
+    Plane plane;
+    bool is_plane = false;
+    std::uint32_t children = none;  // index of its table of eight; none for leaves and undivided nodes
+    double fitted_count = 0;        // points at the last fit
+    Moments moments;
+  };
+  using Children = std::array<std::uint32_t, 8>;
+  // Fixed addresses, so growing never copies; freed entries are used again.
+  template <class T>
+  struct Pool {
+    std::vector<std::unique_ptr<T[]>> blocks;
+    std::vector<std::uint32_t> free;
+    std::uint32_t used = 0;
+    T& operator[](std::uint32_t i) { return blocks[i / block_size][i % block_size]; }
+    const T& operator[](std::uint32_t i) const { return blocks[i / block_size][i % block_size]; }
+    std::uint32_t take();
+    void give_back(std::uint32_t i);
+  };
+
+  VoxelKey root_key(const Eigen::Vector3d& x) const {
+    return pack_key(fast_floor(x.x() * inverse_size_), fast_floor(x.y() * inverse_size_), fast_floor(x.z() * inverse_size_));
+  }
+  static unsigned octant(const Eigen::Vector3d& x, const Eigen::Vector3d& centre) {
+    return (x.x() >= centre.x() ? 1u : 0u) | (x.y() >= centre.y() ? 2u : 0u) | (x.z() >= centre.z() ? 4u : 0u);
+  }
+  Eigen::Vector3d root_centre(const Eigen::Vector3d& x) const;
+  static Eigen::Vector3d child_centre(const Eigen::Vector3d& centre, unsigned octant, double quarter);
+  void insert_one(const PointGroup& group);
+  bool settled_and_explains(const Node& node, const PointGroup& group) const;
+  void refit_if_due(Node& node, const Eigen::Vector3d& origin);
+  void erase_root(VoxelKey key);
+  void free_tree(std::uint32_t node);
+
+  MapConfig config_;
+  double inverse_size_;
+  VoxelIndex roots_;
+  std::vector<VoxelKey> keys_;  // of all roots, in order of creation (no result depends on hash order)
+  Pool<Node> nodes_;
+  Pool<Children> children_;
+  std::size_t node_count_ = 0;
+  Eigen::Vector3d last_forget_ = Eigen::Vector3d::Zero();
+};
+
+template <class F>
+bool VoxelMap::visit_planes(const Eigen::Vector3d& x, F&& f) const {
+  std::uint32_t index = roots_.find(root_key(x));
+  if (index == none) return false;
+  Eigen::Vector3d centre = root_centre(x);
+  double quarter = config_.voxel_size / 4;
+  while (index != none) {
+    const Node& node = nodes_[index];
+    if (node.is_plane && f(Match{&node.plane, index})) return true;
+    if (node.children == none) return false;
+    const unsigned o = octant(x, centre);
+    centre = child_centre(centre, o, quarter);
+    quarter *= 0.5;
+    index = children_[node.children][o];
+  }
+  return false;
+}
+
+}  // namespace kilvo
