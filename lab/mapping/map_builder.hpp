@@ -1,0 +1,70 @@
+// The map a user keeps: every point the estimator saw in the world, thinned to one per voxel, also where the estimator has forgotten.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "kilvo/math/field.hpp"
+
+namespace kilvo::lab {
+
+struct MappingConfig {
+  double resolution = 0.05;  // m
+
+  static constexpr auto fields() {
+    return std::tuple{
+        Field{"resolution", &MappingConfig::resolution, "m", "edge of the voxels of which the saved map keeps one point each"}};
+  }
+};
+
+/// One point per voxel: the mean of the first 32 that fell into it. A mean is smoother than the first point (walls get thinner than the
+/// LiDAR's noise), and because it is then left alone, a later pass that has drifted neither blurs nor moves what is there. The result
+/// depends on the points and their order only. Memory: 24 bytes per point kept, and 6 to 13 for finding it; storage grows in pieces of 768
+/// KiB.
+class MapBuilder {
+ public:
+  /// Throws std::invalid_argument when the resolution is not a positive length.
+  explicit MapBuilder(const MappingConfig& config = {});
+
+  /// Adds points (x, y, z in the world frame, m; intensity). Points with a non-finite number, and those 2^20 voxels (52 km at 0.05 m) or
+  /// more from the origin along an axis, are dropped and counted.
+  void add(std::span<const Eigen::Vector4f> points_W);
+
+  /// How many points the map has.
+  std::size_t size() const { return size_; }
+  /// Point i (x, y, z, intensity), in the order in which their voxels were first hit. i < size().
+  Eigen::Vector4f point(std::size_t i) const;
+  /// How many of the points given to add() were not usable.
+  std::uint64_t dropped() const { return dropped_; }
+  /// What the map occupies.
+  std::size_t memory_bytes() const;
+
+ private:
+  struct Voxel {
+    std::uint64_t key;          // three indices of 21 bits
+    std::uint16_t position[3];  // the mean within the voxel, in 1/65536 of its edge
+    std::uint16_t count;        // points in the mean
+    float intensity;            // their mean
+  };
+
+  bool locate(const Eigen::Vector4f& point_W, Voxel& sample) const;
+  void merge(const Voxel& sample, std::size_t place);
+  void append(const Voxel& sample);
+  void grow_table();
+  std::size_t place_of(std::uint64_t key) const;
+  const Voxel& voxel(std::size_t i) const;
+
+  double resolution_;
+  std::size_t size_ = 0;
+  std::uint64_t dropped_ = 0;
+  std::vector<std::unique_ptr<Voxel[]>> chunks_;  // never moved: growing needs no second copy
+  std::vector<std::uint32_t> table_;              // open addressing: number of a voxel + 1, 0 where empty
+  int shift_;                                     // a hash >> shift_ is a place in table_
+};
+
+}  // namespace kilvo::lab

@@ -1,0 +1,27 @@
+// Point clouds as binary little-endian PLY: float x y z (m, world frame) and intensity.
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <stdexcept>
+#include <vector>
+
+#include "lab/mapping/map_builder.hpp"
+#include "lab/mapping/output_error.hpp"
+
+namespace kilvo::lab {
+
+/// Writes the whole map, in its order: the same map gives the same bytes. A file that was there stays whole until the new one is complete
+/// (written beside it as PATH.partial, then renamed). Throws OutputError.
+void write_ply(const std::filesystem::path& path, const MapBuilder& map);
+
+/// A file that is not a PLY as written here; the message names the path.
+class PlyError : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Reads x, y, z, intensity of a binary little-endian PLY with one element `vertex`; other float and uchar properties are skipped, a
+/// missing intensity is 0. Throws PlyError.
+std::vector<Eigen::Vector4f> read_ply(const std::filesystem::path& path);
+
+}  // namespace kilvo::lab
