@@ -1,0 +1,16 @@
+// The two small, fast messages: sensor_msgs/Imu and sensor_msgs/JointState.
+#pragma once
+
+#include "kilvo/sensors/measurement.hpp"
+#include "lab/messages/bytes.hpp"
+#include "lab/messages/decoded.hpp"
+
+namespace kilvo::lab {
+
+/// sensor_msgs/Imu. Orientation and covariances are not used. Values are passed on as they are, finite or not.
+Decoded<ImuSample> decode_imu(Bytes message);
+
+/// sensor_msgs/JointState. The four arrays may have any lengths; whether they agree is for the estimator to judge.
+Decoded<JointSample> decode_joint_state(Bytes message);
+
+}  // namespace kilvo::lab

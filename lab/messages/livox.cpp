@@ -1,0 +1,97 @@
+#include "lab/messages/livox.hpp"
+
+#include <cstdlib>
+
+#include "lab/messages/ros_header.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+// CustomPoint: uint32 offset_time, float32 x y z, uint8 reflectivity, tag, line.
+constexpr std::size_t point_bytes = 19;
+
+// Clocks that are one clock do not differ by more: the driver sets stamp and timebase from the same packet.
+constexpr std::int64_t same_clock_ns = 1'000'000'000;
+
+struct Cloud {
+  Time t{};
+  std::int64_t first_offset_ns = 0;  // timebase minus t
+  Bytes points;
+};
+
+Decoded<Cloud> read_cloud(Bytes message) {
+  ByteReader reader(message);
+  Cloud cloud;
+  cloud.t = read_ros_header(reader).stamp;
+  const auto timebase = static_cast<std::int64_t>(reader.read<std::uint64_t>());
+  reader.skip(8);  // point_num, which the array says again; lidar_id, rsvd
+  cloud.points = reader.array(point_bytes);
+  const std::size_t count = cloud.points.size() / point_bytes;
+  if (!reader.ok()) return DecodeError{"livox CustomMsg: the message ends before its points do"};
+  if (reader.remaining() != 0) return DecodeError{"livox CustomMsg: " + std::to_string(reader.remaining()) + " bytes left over at the end"};
+  if (count > most_points_in_a_cloud) return DecodeError{"livox CustomMsg: claims " + std::to_string(count) + " points"};
+  if (to_ns(cloud.t) == 0) cloud.t = time_from_ns(timebase);
+  const bool same_clock = timebase > to_ns(cloud.t) - same_clock_ns && timebase < to_ns(cloud.t) + same_clock_ns;
+  if (same_clock) cloud.first_offset_ns = timebase - to_ns(cloud.t);
+  return cloud;
+}
+
+std::uint32_t offset_time(const std::uint8_t* point) {
+  std::uint32_t offset;
+  std::memcpy(&offset, point, sizeof offset);
+  return offset;
+}
+
+LidarPoint read_point(const std::uint8_t* bytes) {
+  float xyz[3];
+  std::memcpy(xyz, bytes + 4, sizeof xyz);
+  return {xyz[0], xyz[1], xyz[2], static_cast<float>(bytes[16]), 0};
+}
+
+}  // namespace
+
+Decoded<PointTimeFormat> detect_livox_point_time(const std::vector<CloudTimes>& clouds) {
+  for (const auto& cloud : clouds) {
+    for (const auto& times : cloud.candidates) {
+      if (times.high > times.low) return PointTimeFormat{times.field, times.type, TimeUnit::nanoseconds, TimeReference::scan_start, true};
+    }
+  }
+  return DecodeError{"the point times are all equal (field offset_time)"};
+}
+
+Decoded<DecodedScan> decode_livox(Bytes message, const PointTimeFormat& format) {
+  const auto cloud = read_cloud(message);
+  if (!cloud) return DecodeError{cloud.reason()};
+  DecodedScan decoded;
+  decoded.scan.t = cloud->t;
+  decoded.scan.points.reserve(cloud->points.size() / point_bytes);
+  const bool timed = format.reference != TimeReference::none;
+  for (std::size_t at = 0; at < cloud->points.size(); at += point_bytes) {
+    const std::uint8_t* bytes = cloud->points.data() + at;
+    const std::int64_t offset = timed ? cloud->first_offset_ns + offset_time(bytes) : 0;
+    if (std::abs(offset) > farthest_point_time.count()) {
+      ++decoded.absurd_times;
+      continue;
+    }
+    decoded.scan.points.push_back(read_point(bytes));
+    decoded.scan.points.back().offset_ns = static_cast<std::int32_t>(offset);
+  }
+  return decoded;
+}
+
+Decoded<CloudTimes> observe_livox(Bytes message) {
+  const auto cloud = read_cloud(message);
+  if (!cloud) return DecodeError{cloud.reason()};
+  CloudTimes times{cloud->t, cloud->points.size() / point_bytes, {"offset_time", "x", "y", "z", "reflectivity", "tag", "line"}, {}};
+  if (times.points == 0) return times;
+  double low = offset_time(cloud->points.data()), high = low;
+  for (std::size_t at = 0; at < cloud->points.size(); at += point_bytes) {
+    const double offset = offset_time(cloud->points.data() + at);
+    low = std::min(low, offset);
+    high = std::max(high, offset);
+  }
+  times.candidates.push_back({"offset_time", "uint32", low, (low + high) / 2, high});
+  return times;
+}
+
+}  // namespace kilvo::lab

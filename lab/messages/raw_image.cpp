@@ -1,0 +1,42 @@
+#include "lab/messages/raw_image.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "lab/messages/pixel_formats.hpp"
+#include "lab/messages/ros_header.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+DecodeError bad(const std::string& what) { return {"sensor_msgs/Image: " + what}; }
+
+}  // namespace
+
+Decoded<CameraImage> decode_image(Bytes message) {
+  ByteReader reader(message);
+  CameraImage decoded;
+  decoded.t = read_ros_header(reader).stamp;
+  RawPixels raw;
+  raw.height = reader.read<std::uint32_t>();
+  raw.width = reader.read<std::uint32_t>();
+  const std::string_view encoding = reader.string();
+  raw.big_endian = reader.read<std::uint8_t>() != 0;
+  raw.step = reader.read<std::uint32_t>();
+  raw.data = reader.array();
+  if (!reader.ok()) return bad("the message ends before its data does");
+  if (reader.remaining() != 0) return bad(std::to_string(reader.remaining()) + " bytes left over at the end");
+  if (raw.width == 0 || raw.height == 0) return bad("the image is empty");
+  if (raw.width > most_pixels / raw.height) return bad(std::to_string(raw.width) + "x" + std::to_string(raw.height) + " is too large");
+
+  const PixelFormat* format = find_pixel_format(encoding);
+  if (format == nullptr) return bad("encoding " + std::string(encoding.substr(0, 40)) + " is not read");
+  const std::size_t row_bytes = raw.width * format->bytes_per_pixel;
+  if (raw.step < row_bytes || raw.data.size() < row_bytes || (raw.data.size() - row_bytes) / raw.step < raw.height - 1) {
+    return bad("step " + std::to_string(raw.step) + " and " + std::to_string(raw.data.size()) + " bytes do not hold the image");
+  }
+  decoded.image = format->convert(raw);
+  return decoded;
+}
+
+}  // namespace kilvo::lab
