@@ -1,0 +1,95 @@
+// A recording as a MeasurementSource: the chosen topics, decoded, in the order in which they were recorded.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "kilvo/sensors/measurement_source.hpp"
+#include "lab/messages/point_time.hpp"
+#include "lab/recordings/rosbag1_reader.hpp"
+#include "lab/recordings/topic_choice.hpp"
+
+namespace kilvo::lab {
+
+/// What is wanted of one sensor.
+struct SensorInput {
+  bool use = false;
+  std::string topic;       // `/camera/image_raw` means its `/compressed` too
+  double rate = 0;         // Hz, nominal; 0: unknown. Of the LiDAR it helps to tell the unit of the point times
+  double time_offset = 0;  // s, added to the stamps (of a scan: to the time that its points count from)
+};
+
+/// Messages of a sensor recorded in [from, until) seconds after the beginning of the recording are withheld.
+struct DropInterval {
+  Sensor sensor{};
+  double from = 0;
+  double until = std::numeric_limits<double>::infinity();
+};
+
+struct RecordingOptions {
+  std::array<SensorInput, sensor_count> sensors;
+  bool no_deskew = false;                                     // take every cloud at its stamp; needs no point times
+  double start = 0;                                           // s from the beginning of the recording
+  double duration = std::numeric_limits<double>::infinity();  // s
+  std::vector<DropInterval> drops;
+
+  SensorInput& operator[](Sensor s) { return sensors[static_cast<std::size_t>(s)]; }
+  const SensorInput& operator[](Sensor s) const { return sensors[static_cast<std::size_t>(s)]; }
+};
+
+/// What became of the messages of one sensor within [start, start + duration).
+struct SensorCounts {
+  std::uint64_t used = 0;
+  std::map<std::string, std::uint64_t> dropped;  // cause -> messages: "drop_option", "undecodable", "too_large"
+  std::uint64_t absurd_point_times = 0;          // points, not messages: dropped from their clouds
+};
+
+class RecordingSource final : public MeasurementSource {
+ public:
+  /// Throws InputError: no such recording, a used sensor without a topic or with one of a wrong type, clouds without point times.
+  RecordingSource(const std::filesystem::path& input, RecordingOptions options);
+
+  std::optional<Measurement> next() override;
+
+  /// When the measurement that next() gave last was recorded.
+  Time recorded() const { return recorded_; }
+
+  /// Over the whole file: time of the first recorded message, and from there to the last.
+  Time begin() const { return reader_.begin(); }
+  Duration duration() const { return reader_.end() - reader_.begin(); }
+  double progress() const { return reader_.progress(); }  // 0 to 1
+
+  /// Empty when the sensor is not used.
+  const std::string& topic(Sensor s) const { return chosen_[static_cast<std::size_t>(s)].topic; }
+  /// How the points' times were found to be written, for the user to read.
+  const PointTimeFormat& point_time() const { return point_time_; }
+
+  const SensorCounts& counts(Sensor s) const { return counts_[static_cast<std::size_t>(s)]; }
+  bool input_damaged() const { return reader_.damage().has_value(); }
+  std::optional<Damage> damage() const { return reader_.damage(); }
+  /// What the user should know, one sentence each; complete when next() has given nothing.
+  std::vector<std::string> warnings() const;
+
+ private:
+  bool is_dropped(Sensor sensor, Time recorded) const;
+  std::optional<Measurement> decode(Sensor sensor, const RawMessage& message);
+
+  Rosbag1Reader reader_;
+  RecordingOptions options_;
+  std::array<ChosenTopic, sensor_count> chosen_;
+  PointTimeFormat point_time_;
+  std::array<SensorCounts, sensor_count> counts_;
+  std::array<std::string, sensor_count> first_fault_;  // why the first undecodable message was
+  Time recorded_{};
+};
+
+/// Looks at the first clouds of a LiDAR topic. Afterwards the reader must be given its selection again. Throws InputError, naming the
+/// topic and its fields, when the clouds do not say when their points were measured; nothing is found when there are no clouds at all.
+std::optional<PointTimeFormat> find_point_time(Rosbag1Reader& reader, const ChosenTopic& lidar, double nominal_rate);
+
+}  // namespace kilvo::lab

@@ -1,0 +1,77 @@
+#include "lab/recordings/rosbag1_inflate.hpp"
+
+#include <algorithm>
+#include <bzlib.h>
+#include <lz4frame.h>
+#include <memory>
+
+namespace kilvo::lab {
+namespace {
+
+// Beyond this the output grows as data really come out: a false claim costs little.
+constexpr std::size_t first_step = std::size_t{8} << 20;
+
+/// Makes room for more output, up to `size` bytes and one more, by which too much is noticed.
+void grow(std::vector<std::uint8_t>& bytes, std::size_t size) { bytes.resize(std::min(size + 1, std::max(first_step, 2 * bytes.size()))); }
+
+Inflated failed(std::string fault) { return {{}, std::move(fault)}; }
+
+Inflated finished(std::vector<std::uint8_t> bytes, std::size_t filled, std::size_t size) {
+  bytes.resize(filled);
+  const bool short_of = filled < size;
+  return {std::move(bytes), short_of ? "inflates to " + std::to_string(filled) + " bytes instead of " + std::to_string(size) : ""};
+}
+
+/// rosbag's lz4 stream is the LZ4 frame format.
+Inflated inflate_lz4(Bytes compressed, std::size_t size) {
+  LZ4F_dctx* raw = nullptr;
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&raw, LZ4F_VERSION)) != 0) return failed("lz4: no memory");
+  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(raw, &LZ4F_freeDecompressionContext);
+  std::vector<std::uint8_t> bytes;
+  std::size_t in = 0, out = 0;
+  while (true) {
+    if (out == bytes.size()) grow(bytes, size);
+    std::size_t given = bytes.size() - out, taken = compressed.size() - in;
+    const std::size_t hint = LZ4F_decompress(context.get(), bytes.data() + out, &given, compressed.data() + in, &taken, nullptr);
+    if (LZ4F_isError(hint) != 0) return failed(std::string("lz4: ") + LZ4F_getErrorName(hint));
+    in += taken;
+    out += given;
+    if (out > size) return failed("lz4: more data than the chunk claims");
+    if (hint == 0 || (taken == 0 && given == 0)) return finished(std::move(bytes), out, size);
+  }
+}
+
+Inflated inflate_bz2(Bytes compressed, std::size_t size) {
+  bz_stream stream{};
+  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return failed("bz2: no memory");
+  const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> owner(&stream, &BZ2_bzDecompressEnd);
+  // bzlib is old and takes its input as non-const; it does not write to it.
+  stream.next_in = const_cast<char*>(reinterpret_cast<const char*>(compressed.data()));
+  stream.avail_in = static_cast<unsigned>(compressed.size());
+  std::vector<std::uint8_t> bytes;
+  std::size_t out = 0;
+  while (true) {
+    if (out == bytes.size()) grow(bytes, size);
+    stream.next_out = reinterpret_cast<char*>(bytes.data() + out);
+    stream.avail_out = static_cast<unsigned>(bytes.size() - out);
+    const unsigned room = stream.avail_out, input = stream.avail_in;
+    const int result = BZ2_bzDecompress(&stream);
+    if (result != BZ_OK && result != BZ_STREAM_END) return failed("bz2: damaged data (" + std::to_string(result) + ")");
+    out += room - stream.avail_out;
+    if (out > size) return failed("bz2: more data than the chunk claims");
+    const bool stuck = stream.avail_out == room && stream.avail_in == input;
+    if (result == BZ_STREAM_END || stuck) return finished(std::move(bytes), out, size);
+  }
+}
+
+}  // namespace
+
+Inflated inflate_chunk(std::string_view compression, Bytes compressed, std::size_t size) {
+  if (size > most_chunk_bytes) return failed("claims to inflate to " + std::to_string(size) + " bytes");
+  if (compressed.empty()) return failed("has no data");
+  if (compression == "lz4") return inflate_lz4(compressed, size);
+  if (compression == "bz2") return inflate_bz2(compressed, size);
+  return failed("unknown compression " + std::string(compression.substr(0, 20)));
+}
+
+}  // namespace kilvo::lab

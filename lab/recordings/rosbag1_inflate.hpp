@@ -1,0 +1,23 @@
+// The chunk compressions of ROS 1 bags.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "lab/messages/bytes.hpp"
+
+namespace kilvo::lab {
+
+/// Chunks that claim to be larger than this when inflated are refused. (rosbag's default chunk is 0.75 MB.)
+inline constexpr std::size_t most_chunk_bytes = std::size_t{256} << 20;
+
+struct Inflated {
+  std::vector<std::uint8_t> bytes;
+  std::string fault;  // empty: all of it. Otherwise `bytes` is the beginning that is known to be good, possibly nothing
+};
+
+/// `compression` is "lz4" or "bz2"; `size` what the chunk claims to be when inflated: more is a fault. Input that only ends too early
+/// gives its good beginning; input that fails its checksum gives nothing, since nobody knows where it went wrong.
+Inflated inflate_chunk(std::string_view compression, Bytes compressed, std::size_t size);
+
+}  // namespace kilvo::lab

@@ -1,0 +1,53 @@
+// What lies where in a ROS 1 bag: found by walking from record to record through the whole file, which needs a few reads per chunk and
+// works whether or not the bag was closed properly. The bag's own index at its end is not relied upon.
+#pragma once
+
+#include <map>
+#include <set>
+#include <vector>
+
+#include "lab/recordings/file_bytes.hpp"
+#include "lab/recordings/rosbag1_record.hpp"
+
+namespace kilvo::lab {
+
+/// The times at which messages of one connection were recorded.
+struct TimesSummary {
+  std::uint64_t count = 0;
+  Time first{}, last{};
+  Duration largest_gap{};
+
+  void add(Time t);
+  void append(const TimesSummary& later);
+};
+
+struct Damage {
+  std::uint64_t offset = 0;  // bytes from the beginning of the file
+  std::string reason;
+};
+
+struct BagChunk {
+  std::uint64_t offset = 0;       // of the chunk's record
+  std::uint64_t data_offset = 0;  // of its (compressed) content
+  std::uint64_t data_size = 0;    // as far as it is in the file and no other chunk begins
+  std::uint32_t inflated_size = 0;
+  std::string compression;       // none, lz4, bz2
+  bool indexed = false;          // its index records were read, and with them the times below
+  bool new_connections = false;  // the index has a connection that no chunk before it has
+  Time first{}, last{};
+};
+
+struct BagLayout {
+  std::vector<BagChunk> chunks;                   // in the order of the file
+  std::map<std::uint32_t, BagConnection> footer;  // connection records at the end of the bag
+  std::map<std::uint32_t, TimesSummary> times;    // by connection, over the indexed chunks
+  std::vector<Damage> damages;                    // in the order of the file; at most most_damages
+};
+
+inline constexpr std::size_t most_damages = 100;
+inline constexpr std::size_t most_chunks = 2'000'000;
+
+/// Throws InputError when this is no ROS 1 bag 2.0 at all; anything worse inside is damage, which is skipped to the next chunk.
+BagLayout read_bag_layout(const FileBytes& file);
+
+}  // namespace kilvo::lab
