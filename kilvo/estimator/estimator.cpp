@@ -1,5 +1,6 @@
 #include "kilvo/estimator/estimator.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <stdexcept>
 
@@ -85,13 +86,14 @@ std::vector<Output> Estimator::finish() {
   while (auto next = timeline_.pop()) handle(*next, out);
   // A scan that ends between the last IMU sample and where the next would have been: the last sample is held.
   const Duration period = from_seconds(1.5 / robot_.imu.rate);
-  while (estimate_ && last_imu_ && !pending_.empty() && pending_.front().end <= last_imu_->t + period) {
-    PendingScan next = std::move(pending_.front());
+  while (estimate_ && !imu_.empty() && !pending_.empty() && pending_.front().end <= imu_.back().t + period) {
+    const PendingScan next = std::move(pending_.front());
     pending_.pop_front();
-    ImuSample held = *last_imu_;
-    held.t = next.end;
-    advance(*last_imu_, held, next.end);
-    process(std::move(next.scan), next.end, out);
+    if (next.end > imu_.back().t) {
+      imu_.push_back(imu_.back());
+      imu_.back().t = next.end;
+    }
+    process(next.scan, next.end, out);
   }
   for (std::size_t i = 0; i < pending_.size(); ++i) drop(Sensor::lidar, "no IMU");
   pending_.clear();
@@ -131,7 +133,7 @@ void Estimator::handle_before_start(Measurement& m, std::vector<Output>& out) {
 
 void Estimator::begin(const Start& start, std::vector<Output>& out) {
   accel_scale_ = start.accel_scale;
-  estimate_ = good_ = start.estimate;
+  estimate_ = anchor_ = start.estimate;
   trajectory_.push(estimate_->t, estimate_->x.pose(), estimate_->x.v);
   if (!start.still) statistics_.warnings.push_back("the robot did not stand still: started on the move, with wide uncertainties");
   const double norm = start.resting_norm * start.accel_scale;
@@ -150,55 +152,57 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   }
 }
 
-void Estimator::advance(const ImuSample& from, const ImuSample& to, Time until) {
-  ImuInterval interval = ImuInterval::between(from, to, estimate_->t, until);
-  const double gap = to_seconds(to.t - from.t);
-  if (gap > config_.max_imu_gap) {
-    // Nobody saw the motion. White acceleration of a few m/s^2 over the gap, as a density, and no trust in the two samples.
-    constexpr double unknown_accel = 3.0;  // m/s^2
-    const double density2 = unknown_accel * unknown_accel * gap;
-    interval.noise_scale = density2 / (config_.noise.accel * config_.noise.accel);
-    if (gap > 1.0) {
-      interval.gyro_begin = interval.gyro_end = estimate_->x.bg;
-      interval.accel_begin = interval.accel_end = estimate_->x.ba - estimate_->x.R.matrix().transpose() * estimate_->x.g;
-      estimate_->x.v.setZero();
-    }
+// The closed interval [begin, end] between two samples; when nobody saw the motion in between, with noise that says so.
+ImuInterval Estimator::interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const {
+  ImuInterval interval = ImuInterval::between(a, b, begin, end);
+  const double gap = to_seconds(b.t - a.t);
+  if (gap <= config_.max_imu_gap) return interval;
+  constexpr double unknown_accel = 3.0;  // m/s^2, constant over the gap: as a density, times the gap
+  interval.noise_scale = unknown_accel * unknown_accel * gap / (config_.noise.accel * config_.noise.accel);
+  constexpr double blind = 1.0;  // s; after longer than this the two samples say nothing of the time between
+  if (gap > blind) {
+    interval.gyro_begin = interval.gyro_end = x.bg;
+    interval.accel_begin = interval.accel_end = x.ba - x.R.inverse() * x.g;
   }
-  estimate_ = predict(*estimate_, interval, {}, config_.noise);
-  trajectory_.push(estimate_->t, estimate_->x.pose(), estimate_->x.v);
+  return interval;
+}
+
+void Estimator::propagate(Estimate& e, Time until) {
+  // The sample at or before e.t.
+  auto next = std::upper_bound(imu_.begin(), imu_.end(), e.t, [](Time t, const ImuSample& s) { return t < s.t; });
+  while (e.t < until && next != imu_.end()) {
+    const ImuSample& a = next == imu_.begin() ? *next : *(next - 1);
+    const Time end = std::min(until, next->t);
+    e = predict(e, interval_between(a, *next, e.t, end, e.x), {}, config_.noise);
+    trajectory_.push(e.t, e.x.pose(), e.x.v);
+    ++next;
+  }
 }
 
 void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   s.accel *= accel_scale_;
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::imu)].used;
-  if (!last_imu_) {
-    last_imu_ = s;
-    if (s.t < estimate_->t) return;
-  }
+  imu_.push_back(s);
+  if (s.t < estimate_->t) return;
   while (!pending_.empty() && pending_.front().end <= s.t) {
-    PendingScan next = std::move(pending_.front());
+    const PendingScan next = std::move(pending_.front());
     pending_.pop_front();
-    if (next.end < estimate_->t) {
-      drop(Sensor::lidar, "before the state");
-      continue;
-    }
-    advance(*last_imu_, s, next.end);
-    process(std::move(next.scan), next.end, out);
+    process(next.scan, next.end, out);
   }
-  if (s.t > estimate_->t) advance(*last_imu_, s, s.t);
-  last_imu_ = s;
+  propagate(*estimate_, s.t);
   keep_finite();
   out.push_back(output_now());
 }
 
 bool Estimator::keep_finite() {
   if (is_finite(*estimate_)) return true;
+  // Back to the last good state; where the robot went since, nobody knows.
   const Time t = estimate_->t;
-  estimate_ = good_;
-  estimate_->t = t;
-  estimate_->x.v.setZero();
-  estimate_->P.diagonal().segment<3>(at::v).array() += 1.0;
-  estimate_->P.diagonal().segment<6>(at::R).array() += 0.01;
+  anchor_.t = t;
+  anchor_.x.v.setZero();
+  anchor_.P.diagonal().segment<3>(at::v).array() += 1.0;
+  anchor_.P.diagonal().segment<6>(at::R).array() += 0.01;
+  estimate_ = anchor_;
   ++statistics_.rollbacks;
   trajectory_.clear();
   trajectory_.push(t, estimate_->x.pose(), estimate_->x.v);
@@ -210,35 +214,49 @@ Output Estimator::output_now() const {
   o.t = estimate_->t;
   o.x = estimate_->x;
   o.P = estimate_->P;
+  o.P.topLeftCorner<6, 6>() += map_error_.at(estimate_->x.pose());
   o.modality = used_[static_cast<std::size_t>(Sensor::lidar)] ? Modality::li : Modality::coast;
   return o;
 }
 
-void Estimator::process(LidarScan scan, Time end, std::vector<Output>& out) {
+void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& out) {
+  if (end < anchor_.t) return drop(Sensor::lidar, "before the state");
   Stopwatch watch;
-  const std::vector<PointXYZI> points = undistort(scan, trajectory_, end, robot_.lidar, statistics_.points);
-  const std::vector<PointCluster> clusters = downsample(points, estimate_->x.pose(), config_.lidar.voxel_size);
+  // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
+  // the sweep cancels to first order. What came since is replayed.
+  const Time centre = std::max(anchor_.t, end - (end - begin_of(scan)) / 2);
+  Estimate prior = anchor_;
+  propagate(prior, centre);
+  Estimate ahead = prior;
+  propagate(ahead, end);
+  const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
+  const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size);
   const Eigen::Vector3d p_IL = robot_.lidar.T_imu_lidar.p;
-  LidarModel model(map_, clusters, p_IL, config_.lidar);
-  if (!map_.empty()) estimate_ = update(*estimate_, model, config_.update).posterior;
+  LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), config_.lidar);
+  estimate_ = map_.empty() ? prior : update(prior, model, config_.update).posterior;
   const bool good = keep_finite();
   StageTimes stages;
   stages.lidar_us = watch.lap_us();
 
+  const SE3 T_WI = estimate_->x.pose();
   if (good) {
-    trajectory_.correct(estimate_->x.pose(), estimate_->x.v);
-    map_.insert(to_world(clusters, estimate_->x.pose(), p_IL, config_.lidar));
+    trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
+    map_error_.registered(T_WI, model.by_epoch());
+    const std::uint32_t epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
+    map_.insert(to_world(clusters, T_WI, p_IL, config_.lidar), epoch);
     map_.forget(estimate_->x.p);
-    good_ = *estimate_;
+    anchor_ = *estimate_;
+    while (imu_.size() > 2 && imu_[1].t <= anchor_.t) imu_.pop_front();
   }
   stages.map_us = watch.lap_us();
 
+  propagate(*estimate_, end);
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::lidar)].used;
   statistics_.diverged = statistics_.diverged || estimate_->x.v.norm() > absurd_speed;
   Output o = output_now();
   o.is_sweep = true;
   o.registration = model.report();
-  o.points_W = in_world(points, estimate_->x.pose());
+  o.points_W = in_world(points, T_WI);
   o.stages = stages;
   o.stages.other_us = watch.lap_us();
   out.push_back(std::move(o));

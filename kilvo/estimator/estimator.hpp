@@ -9,6 +9,7 @@
 
 #include "kilvo/estimator/config.hpp"
 #include "kilvo/estimator/initialise.hpp"
+#include "kilvo/estimator/map_error.hpp"
 #include "kilvo/estimator/output.hpp"
 #include "kilvo/estimator/timeline.hpp"
 #include "kilvo/filter/trajectory.hpp"
@@ -40,8 +41,9 @@ class Estimator {
   void handle_imu(ImuSample s, std::vector<Output>& out);
   void handle_before_start(Measurement& m, std::vector<Output>& out);
   void begin(const Start& start, std::vector<Output>& out);
-  void advance(const ImuSample& from, const ImuSample& to, Time until);
-  void process(LidarScan scan, Time end, std::vector<Output>& out);
+  ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
+  void propagate(Estimate& e, Time until);
+  void process(const LidarScan& scan, Time end, std::vector<Output>& out);
   void bound_pending();
   bool keep_finite();
   void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
@@ -55,9 +57,9 @@ class Estimator {
   std::deque<Measurement> before_start_;
   double accel_scale_ = 1;
 
-  std::optional<Estimate> estimate_;
-  Estimate good_;  // the last one that passed the check, after a sweep
-  std::optional<ImuSample> last_imu_;
+  std::optional<Estimate> estimate_;  // at the newest IMU sample
+  Estimate anchor_;                   // after the last sweep, at the sweep's own time; what came since is replayed on it
+  std::deque<ImuSample> imu_;         // from the last one before the anchor on
   struct PendingScan {
     LidarScan scan;
     Time end;
@@ -65,6 +67,7 @@ class Estimator {
   std::deque<PendingScan> pending_;
   Trajectory trajectory_;
   VoxelMap map_;
+  MapError map_error_;
   Statistics statistics_;
 };
 

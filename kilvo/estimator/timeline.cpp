@@ -12,6 +12,12 @@ Time completion_of(const Measurement& m) {
   return scan->t + Duration(last);
 }
 
+Time begin_of(const LidarScan& scan) {
+  std::int32_t first = scan.points.empty() ? 0 : scan.points.front().offset_ns;
+  for (const LidarPoint& p : scan.points) first = std::min(first, p.offset_ns);
+  return scan.t + Duration(first);
+}
+
 std::optional<std::string> Timeline::push(Measurement m) {
   const Time key = completion_of(m), stamp = stamp_of(m);
   const auto s = static_cast<std::size_t>(sensor_of(m));

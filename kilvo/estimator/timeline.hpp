@@ -16,6 +16,9 @@ namespace kilvo {
 /// When a measurement is complete: a scan at its last point, anything else at its stamp.
 Time completion_of(const Measurement& m);
 
+/// When the first point of a scan was taken.
+Time begin_of(const LidarScan& scan);
+
 class Timeline {
  public:
   Timeline(std::array<bool, sensor_count> expected, Duration max_wait) : expected_(expected), max_wait_(max_wait) {}

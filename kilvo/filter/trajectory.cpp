@@ -30,17 +30,15 @@ void Trajectory::push(Time t, const SE3& T_WI, const Eigen::Vector3d& v_W) {
   entries_.push_back({t, T_WI, v_W});
 }
 
-void Trajectory::correct(const SE3& corrected, const Eigen::Vector3d& v_W) {
-  if (entries_.empty()) return;
-  const Entry& last = entries_.back();
-  const SE3 C = corrected * last.T_WI.inverse();
-  const Eigen::Vector3d dv = v_W - C.R * last.v_W;
-  const Time t = last.t;
+void Trajectory::correct(Time t, const SE3& corrected, const Eigen::Vector3d& dv_W) {
+  const auto before = at(t);
+  if (!before) return;
+  const SE3 C = corrected * before->inverse();
+  while (entries_.back().t > t) entries_.pop_back();
   for (Entry& e : entries_) {
-    // A velocity that was wrong at the newest entry was wrong before it as well, and moved the older positions by it.
     e.T_WI = C * e.T_WI;
-    e.T_WI.p -= dv * to_seconds(t - e.t);
-    e.v_W = C.R * e.v_W + dv;
+    e.T_WI.p -= dv_W * to_seconds(t - e.t);
+    e.v_W = C.R * e.v_W + dv_W;
   }
 }
 

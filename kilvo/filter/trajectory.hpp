@@ -23,9 +23,9 @@ class Trajectory {
   /// Appends; an entry of the newest time replaces it; an older one is ignored.
   void push(Time t, const SE3& T_WI, const Eigen::Vector3d& v_W);
 
-  /// The newest entry becomes `corrected` and all older ones move with it rigidly, velocities included: the correction of a sweep is
-  /// no motion, so relative motion before it stays what it was.
-  void correct(const SE3& corrected, const Eigen::Vector3d& v_W);
+  /// The pose at `t` becomes `corrected`, its velocity changes by `dv_W`. Entries before move along rigidly, so the correction of a sweep
+  /// is no motion and relative motion stays what it was (but for dv, which had moved them); entries after `t` are dropped.
+  void correct(Time t, const SE3& corrected, const Eigen::Vector3d& dv_W);
 
   void clear() { entries_.clear(); }
   bool empty() const { return entries_.empty(); }

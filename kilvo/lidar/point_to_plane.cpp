@@ -25,8 +25,9 @@ PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, cons
   return row;
 }
 
-LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const LidarConfig& config)
-    : map_(map), clusters_(clusters), p_IL_(p_IL), config_(config), associations_(clusters.size()), rows_of_node_(map.node_capacity(), 0) {}
+LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL,
+                       const PoseCovariance& map_error, const LidarConfig& config)
+    : map_(map), clusters_(clusters), p_IL_(p_IL), map_error_(map_error), config_(config), associations_(clusters.size()), rows_of_node_(map.node_capacity(), 0) {}
 
 bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P, Association& out) const {
   const Plane& plane = *match.plane;
@@ -45,7 +46,7 @@ bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluste
     const double thickness = static_cast<double>(n.dot(cluster.scatter_matrix() * n) / cluster.count);
     if (thickness > thickness_sigmas2 * (sensor + rough)) return false;
   }
-  out = {&plane, match.node, variance, plane_variance, row};
+  out = {&plane, match.node, match.epoch, 0, variance, plane_variance, row};
   return true;
 }
 
@@ -75,7 +76,7 @@ LidarModel::Association LidarModel::associate(const PointCluster& cluster, const
 
 Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   const SE3 T_WI = x.pose();
-  const PoseCovariance P = prior.topLeftCorner<6, 6>();
+  const PoseCovariance P = prior.topLeftCorner<6, 6>() + map_error_;
   report_.clusters = static_cast<int>(clusters_.size());
   report_.matched = report_.rejected = 0;
   for (std::size_t i = 0; i < clusters_.size(); ++i) {
@@ -88,10 +89,10 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   info.columns = {at::R, at::R + 1, at::R + 2, at::p, at::p + 1, at::p + 2};
   Eigen::Matrix<double, 6, 6> fake = Eigen::Matrix<double, 6, 6>::Zero();
   for (std::size_t i = 0; i < associations_.size(); ++i) {
-    const Association& a = associations_[i];
+    Association& a = associations_[i];
     if (a.plane == nullptr) continue;
     // k rows of one plane share its error: each carries k times its variance, so that together they average it not at all.
-    const double weight = 1.0 / (a.variance + rows_of_node_[a.node] * a.plane_variance);
+    const double weight = a.weight = 1.0 / (a.variance + rows_of_node_[a.node] * a.plane_variance);
     info.A.selfadjointView<Eigen::Lower>().rankUpdate(a.row.J, weight);
     info.b += weight * a.row.r * a.row.J;
     info.chi2 += weight * a.row.r * a.row.r;
@@ -118,6 +119,18 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   first_ = false;
   project_out(report_.degeneracy, info);
   return info;
+}
+
+std::vector<EpochInformation> LidarModel::by_epoch() const {
+  std::vector<EpochInformation> out;
+  for (const Association& a : associations_) {
+    if (a.plane == nullptr) continue;
+    auto it = std::find_if(out.begin(), out.end(), [&a](const EpochInformation& e) { return e.epoch == a.epoch; });
+    if (it == out.end()) it = out.insert(out.end(), EpochInformation{a.epoch});
+    it->A.selfadjointView<Eigen::Lower>().rankUpdate(a.row.J, a.weight);
+  }
+  for (EpochInformation& e : out) e.A.triangularView<Eigen::StrictlyUpper>() = e.A.transpose();
+  return out;
 }
 
 std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL, const LidarConfig& config) {

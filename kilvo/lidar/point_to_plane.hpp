@@ -28,20 +28,33 @@ struct RegistrationReport {
   Degeneracy degeneracy;
 };
 
+/// What the rows on planes of one epoch of the map (VoxelMap::insert) know about the pose.
+struct EpochInformation {
+  std::uint32_t epoch = 0;
+  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
 /// The model that `update` calls: at each iterate it looks the planes up anew, gates, and sums the rows.
 class LidarModel {
  public:
-  /// Keeps references: the map and the clusters must outlive it.
-  LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const LidarConfig& config);
+  /// Keeps references: the map and the clusters must outlive it. `map_error`: covariance of the pose from the map's own error, by which
+  /// the gate is wider than the filter's covariance says.
+  LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const PoseCovariance& map_error,
+             const LidarConfig& config);
 
   Information<6> operator()(const State& x, const Covariance& prior);
 
   const RegistrationReport& report() const { return report_; }
 
+  /// The information of the last evaluation, by epoch of the map.
+  std::vector<EpochInformation> by_epoch() const;
+
  private:
   struct Association {
     const Plane* plane = nullptr;
     std::uint32_t node = 0;
+    std::uint32_t epoch = 0;
+    double weight = 0;           // 1/m^2, of the last evaluation
     double variance = 0;         // of the cluster's mean along the normal: measurement and roughness, m^2
     double plane_variance = 0;   // of the plane under it, common to all clusters of the plane, m^2
     PointToPlaneRow row;
@@ -53,6 +66,7 @@ class LidarModel {
   const VoxelMap& map_;
   std::span<const PointCluster> clusters_;
   Eigen::Vector3d p_IL_;
+  PoseCovariance map_error_;
   LidarConfig config_;
   std::vector<Association> associations_;
   std::vector<std::uint16_t> rows_of_node_;

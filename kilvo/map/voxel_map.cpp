@@ -76,19 +76,20 @@ void VoxelMap::refit_if_due(Node& node, const Eigen::Vector3d& origin) {
   if (plane) node.plane = *plane;
 }
 
-void VoxelMap::insert(std::span<const PointGroup> groups) {
+void VoxelMap::insert(std::span<const PointGroup> groups, std::uint32_t epoch) {
   for (const PointGroup& g : groups) {
     constexpr double farthest = 1e5;  // m; what is beyond is no place a robot walks to, and would leave the key's bits
-    if (g.count > 0 && g.mean.cwiseAbs().maxCoeff() < farthest) insert_one(g);
+    if (g.count > 0 && g.mean.cwiseAbs().maxCoeff() < farthest) insert_one(g, epoch);
   }
 }
 
-void VoxelMap::insert_one(const PointGroup& group) {
+void VoxelMap::insert_one(const PointGroup& group, std::uint32_t epoch) {
   const VoxelKey key = root_key(group.mean);
   std::uint32_t index = roots_.find(key);
-  const auto new_node = [this] {
+  const auto new_node = [this, epoch] {
     const std::uint32_t i = nodes_.take();
     nodes_[i] = Node{};
+    nodes_[i].epoch = epoch;
     ++node_count_;
     return i;
   };

@@ -42,6 +42,7 @@ class VoxelMap {
   struct Match {
     const Plane* plane = nullptr;
     std::uint32_t node = 0;
+    std::uint32_t epoch = 0;  // of the insertion that began the node
   };
 
   /// Calls f(Match) for each plane whose voxel holds x, from the root voxel down to the sub-voxel, until f returns true.
@@ -51,8 +52,9 @@ class VoxelMap {
   /// The largest voxel that holds x and is a plane.
   const Plane* plane_at(const Eigen::Vector3d& x) const;
 
-  /// Adds groups of points in the world; each must fit within one leaf (edge leaf_size()). Planes are refitted as they grow.
-  void insert(std::span<const PointGroup> groups);
+  /// Adds groups of points in the world; each must fit within one leaf (edge leaf_size()). Planes are refitted as they grow. Nodes that
+  /// begin now are marked with `epoch`: the caller's name for the pose error that they share.
+  void insert(std::span<const PointGroup> groups, std::uint32_t epoch);
 
   /// Forgets voxels beyond the radius around `centre`, and the farthest ones while there are more than max_nodes.
   void forget(const Eigen::Vector3d& centre);
@@ -72,6 +74,7 @@ class VoxelMap {
   struct Node {
     Plane plane;
     bool is_plane = false;
+    std::uint32_t epoch = 0;
     std::uint32_t children = none;  // index of its table of eight; none for leaves and undivided nodes
     double fitted_count = 0;        // points at the last fit
     Moments moments;
@@ -97,7 +100,7 @@ class VoxelMap {
   }
   Eigen::Vector3d root_centre(const Eigen::Vector3d& x) const;
   static Eigen::Vector3d child_centre(const Eigen::Vector3d& centre, unsigned octant, double quarter);
-  void insert_one(const PointGroup& group);
+  void insert_one(const PointGroup& group, std::uint32_t epoch);
   bool settled_and_explains(const Node& node, const PointGroup& group) const;
   void refit_if_due(Node& node, const Eigen::Vector3d& origin);
   void erase_root(VoxelKey key);
@@ -121,7 +124,7 @@ bool VoxelMap::visit_planes(const Eigen::Vector3d& x, F&& f) const {
   double quarter = config_.voxel_size / 4;
   while (index != none) {
     const Node& node = nodes_[index];
-    if (node.is_plane && f(Match{&node.plane, index})) return true;
+    if (node.is_plane && f(Match{&node.plane, index, node.epoch})) return true;
     if (node.children == none) return false;
     const unsigned o = octant(x, centre);
     centre = child_centre(centre, o, quarter);

@@ -1,0 +1,77 @@
+#include "kilvo/estimator/map_error.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+namespace kilvo {
+namespace {
+
+// A new epoch begins when a variance has changed by this factor, so their number grows with the logarithm of the uncertainty.
+constexpr double change = 1.25;
+constexpr std::size_t max_epochs = 65536;
+
+// (theta in the body, error of p) -> twist of the world at its origin: phi = R theta, u = dp + p x phi.
+PoseCovariance to_origin(const SE3& T) {
+  PoseCovariance G = PoseCovariance::Zero();
+  G.topLeftCorner<3, 3>() = T.R.matrix();
+  G.bottomLeftCorner<3, 3>() = skew(T.p) * T.R.matrix();
+  G.bottomRightCorner<3, 3>().setIdentity();
+  return G;
+}
+
+PoseCovariance from_origin(const SE3& T) {
+  PoseCovariance G = PoseCovariance::Zero();
+  G.topLeftCorner<3, 3>() = T.R.matrix().transpose();
+  G.bottomLeftCorner<3, 3>() = -skew(T.p);
+  G.bottomRightCorner<3, 3>().setIdentity();
+  return G;
+}
+
+// A root of a covariance that may be singular.
+PoseCovariance root_of(const PoseCovariance& M) {
+  const PoseCovariance padded = M + 1e-16 * PoseCovariance::Identity();
+  return padded.llt().matrixL();
+}
+
+// Pseudo-inverse of the information: a direction that the planes do not know has no error from them.
+PoseCovariance inverse_of_known(const PoseCovariance& A) {
+  const Eigen::Matrix<double, 6, 1> scale = A.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<PoseCovariance> eig(scale.asDiagonal() * A * scale.asDiagonal());
+  constexpr double known = 1e-3;
+  const Eigen::Matrix<double, 6, 1> inverse = eig.eigenvalues().unaryExpr([](double l) { return l > known ? 1.0 / l : 0.0; });
+  return scale.asDiagonal() * eig.eigenvectors() * inverse.asDiagonal() * eig.eigenvectors().transpose() * scale.asDiagonal();
+}
+
+}  // namespace
+
+PoseCovariance MapError::at(const SE3& T_WI) const {
+  const PoseCovariance G = from_origin(T_WI);
+  return G * now_ * G.transpose();
+}
+
+std::uint32_t MapError::epoch_now(const SE3& T_WI, const PoseCovariance& P) {
+  const PoseCovariance total = P + at(T_WI);
+  if (!epochs_.empty()) {
+    const PoseCovariance G = from_origin(T_WI);
+    const PoseCovariance last = G * epochs_.back() * G.transpose();
+    const Eigen::Array<double, 6, 1> ratio = total.diagonal().array() / last.diagonal().array();
+    if ((ratio < change && ratio > 1 / change).all() || epochs_.size() == max_epochs) return static_cast<std::uint32_t>(epochs_.size() - 1);
+  }
+  const PoseCovariance G = to_origin(T_WI);
+  epochs_.push_back(G * total * G.transpose());
+  return static_cast<std::uint32_t>(epochs_.size() - 1);
+}
+
+void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epochs) {
+  PoseCovariance A = PoseCovariance::Zero();
+  for (const EpochInformation& e : epochs) A += e.A;
+  if (!(A.trace() > 0)) return;
+  const PoseCovariance inverse = inverse_of_known(A);
+  const PoseCovariance G = from_origin(T_WI);
+  PoseCovariance root = PoseCovariance::Zero();
+  for (const EpochInformation& e : epochs) root += inverse * e.A * root_of(G * epochs_[e.epoch] * G.transpose());
+  const PoseCovariance H = to_origin(T_WI);
+  now_ = H * (root * root.transpose()) * H.transpose();
+}
+
+}  // namespace kilvo

@@ -1,0 +1,33 @@
+// How wrong the map itself is. A map built by the estimator carries the pose errors of the sweeps that built it; registration against it
+// makes the pose certain relative to the map, not to the start. So the filter's covariance P is of the pose relative to the map around,
+// and what is reported is P + D: D is the error of the map that the last sweep was registered to, from the pose covariances at which
+// its planes were first inserted.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kilvo/filter/state.hpp"
+#include "kilvo/lidar/point_to_plane.hpp"
+
+namespace kilvo {
+
+class MapError {
+ public:
+  /// D at a pose, for the errors (rotation, position) of state.hpp.
+  PoseCovariance at(const SE3& T_WI) const;
+
+  /// The epoch that planes inserted now belong to: planes of one epoch share their pose error, of covariance P + D.
+  std::uint32_t epoch_now(const SE3& T_WI, const PoseCovariance& P);
+
+  /// A sweep was registered with these informations against planes of each epoch; D becomes what their errors do to the pose. They
+  /// are taken as fully correlated, which bounds it from above.
+  void registered(const SE3& T_WI, std::span<const EpochInformation> epochs);
+
+ private:
+  std::vector<PoseCovariance> epochs_;                    // as twists at the world's origin
+  PoseCovariance now_ = PoseCovariance::Zero();           // likewise
+};
+
+}  // namespace kilvo
