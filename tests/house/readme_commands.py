@@ -146,6 +146,9 @@ class Readme:
                 rest = rest[rest.index(line.strip()) + 1:]
 
     def check_keys(self, block: Block) -> None:
+        if not os.path.exists(os.path.join(self.root, "config/robots/g1.yaml")):
+            self.fault(block.line, "there is no config/robots/g1.yaml to hold this against")
+            return
         known = set(re.findall(r"([\w-]+):", re.sub(r"#.*", "", self.read("config/robots/g1.yaml"))))
         for number, line in enumerate(block.lines, block.line):
             for key in re.findall(r"([\w-]+):(?=\s|$)", re.sub(r"#.*", "", line)):
