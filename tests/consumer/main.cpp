@@ -1,7 +1,6 @@
 // A robot stands still for two seconds: the estimator must start, stay where it is, and look up.
 #include <cmath>
 #include <cstdio>
-
 #include <kilvo/estimator/estimator.hpp>
 
 int main() {
