@@ -64,18 +64,19 @@ Decoded<DecodedScan> decode_livox(Bytes message, const PointTimeFormat& format) 
   if (!cloud) return DecodeError{cloud.reason()};
   DecodedScan decoded;
   decoded.scan.t = cloud->t;
-  decoded.scan.points.reserve(cloud->points.size() / point_bytes);
+  auto& points = decoded.scan.points;
+  points.resize(cloud->points.size() / point_bytes);
   const bool timed = format.reference != TimeReference::none;
+  std::size_t kept = 0;
   for (std::size_t at = 0; at < cloud->points.size(); at += point_bytes) {
     const std::uint8_t* bytes = cloud->points.data() + at;
     const std::int64_t offset = timed ? cloud->first_offset_ns + offset_time(bytes) : 0;
-    if (std::abs(offset) > farthest_point_time.count()) {
-      ++decoded.absurd_times;
-      continue;
-    }
-    decoded.scan.points.push_back(read_point(bytes));
-    decoded.scan.points.back().offset_ns = static_cast<std::int32_t>(offset);
+    if (std::abs(offset) > farthest_point_time.count()) continue;
+    points[kept] = read_point(bytes);
+    points[kept++].offset_ns = static_cast<std::int32_t>(offset);
   }
+  decoded.absurd_times = points.size() - kept;
+  points.resize(kept);
   return decoded;
 }
 

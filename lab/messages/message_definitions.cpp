@@ -1,0 +1,97 @@
+// The definitions of the messages that KILVO writes: comments left out, which ROS leaves out of its sums too.
+#include <array>
+
+#include "lab/messages/encode.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr MessageType imu{"sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2", R"(Header header
+geometry_msgs/Quaternion orientation
+float64[9] orientation_covariance
+geometry_msgs/Vector3 angular_velocity
+float64[9] angular_velocity_covariance
+geometry_msgs/Vector3 linear_acceleration
+float64[9] linear_acceleration_covariance
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+)"};
+
+constexpr MessageType joint_state{"sensor_msgs/JointState", "3066dcd76a6cfaef579bd0f34173e9fd", R"(Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+)"};
+
+constexpr MessageType point_cloud2{"sensor_msgs/PointCloud2", "1158d486dd51d683ce2f1be655c3c181", R"(Header header
+uint32 height
+uint32 width
+PointField[] fields
+bool is_bigendian
+uint32 point_step
+uint32 row_step
+uint8[] data
+bool is_dense
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+================================================================================
+MSG: sensor_msgs/PointField
+uint8 INT8=1
+uint8 UINT8=2
+uint8 INT16=3
+uint8 UINT16=4
+uint8 INT32=5
+uint8 UINT32=6
+uint8 FLOAT32=7
+uint8 FLOAT64=8
+string name
+uint32 offset
+uint8 datatype
+uint32 count
+)"};
+
+constexpr MessageType image{"sensor_msgs/Image", "060021388200f6f0f447d0fcd9c64743", R"(Header header
+uint32 height
+uint32 width
+string encoding
+uint8 is_bigendian
+uint32 step
+uint8[] data
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+)"};
+
+}  // namespace
+
+const MessageType& written_type(Sensor sensor) {
+  static constexpr std::array<const MessageType*, sensor_count> types{&imu, &joint_state, &point_cloud2, &image};
+  return *types[static_cast<std::size_t>(sensor)];
+}
+
+}  // namespace kilvo::lab
