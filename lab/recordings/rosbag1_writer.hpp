@@ -1,0 +1,75 @@
+// Writes ROS 1 bags of version 2.0 with an index, as any ROS 1 tool expects them.
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "lab/messages/byte_writer.hpp"
+#include "lab/messages/bytes.hpp"
+#include "lab/messages/encode.hpp"
+
+namespace kilvo::lab {
+
+/// A file that cannot be created or written. The command line ends with exit code 2.
+struct OutputError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+class Rosbag1Writer {
+ public:
+  enum class Compression : std::uint8_t { none, lz4 };
+
+  /// A chunk is written when it holds `chunk_bytes`. Throws OutputError.
+  explicit Rosbag1Writer(const std::filesystem::path& path, Compression compression = Compression::none,
+                         std::size_t chunk_bytes = 768 << 10);
+  /// Closes; a failure to do so is not told: call close() to hear of it.
+  ~Rosbag1Writer();
+  Rosbag1Writer(const Rosbag1Writer&) = delete;
+  Rosbag1Writer& operator=(const Rosbag1Writer&) = delete;
+
+  /// The id to write messages of this topic with.
+  std::uint32_t add_connection(const std::string& topic, const MessageType& type);
+
+  /// `recorded`: when the message arrived; best given in ascending order. Throws OutputError when the disk is full.
+  void write(std::uint32_t connection, Time recorded, Bytes message);
+
+  /// Writes the last chunk and the index. Throws OutputError.
+  void close();
+
+ private:
+  struct Connection {
+    std::string topic;
+    MessageType type;
+    bool defined = false;  // in a chunk
+  };
+  struct IndexEntry {
+    Time time;
+    std::uint32_t offset;  // of the record, in the inflated chunk
+  };
+  struct ChunkInfo {
+    std::uint64_t offset;
+    Time first, last;
+    std::map<std::uint32_t, std::uint32_t> counts;  // by connection
+  };
+
+  void put(const std::vector<std::uint8_t>& bytes);
+  void write_bag_header(std::uint64_t index_pos);
+  void write_chunk();
+
+  std::string name_;
+  std::ofstream file_;
+  std::uint64_t position_ = 0;
+  Compression compression_;
+  std::size_t chunk_bytes_;
+  bool closed_ = false;
+  std::vector<Connection> connections_;
+  ByteWriter content_;  // of the chunk in the making
+  std::map<std::uint32_t, std::vector<IndexEntry>> index_;
+  std::vector<ChunkInfo> chunks_;
+};
+
+}  // namespace kilvo::lab
