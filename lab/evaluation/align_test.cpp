@@ -24,6 +24,7 @@ SE3 curl(double s) {
 template <class Motion>
 std::vector<PosePair> displaced(Motion motion, const SE3& T, int count = 200) {
   std::vector<PosePair> pairs;
+  pairs.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) pairs.push_back({at(0.1 * i), T.inverse() * motion(0.1 * i), motion(0.1 * i)});
   return pairs;
 }

@@ -36,7 +36,7 @@ std::optional<int> take_exponent(std::string_view& s) {
   int exponent = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), exponent);
   if (digits.empty() || !is_digit(digits.front()) || error != std::errc{} || end != digits.data() + digits.size()) return std::nullopt;
-  if (exponent > 100) return std::nullopt;
+  exponent = std::min(exponent, 100000);  // as good as any larger one
   return negative ? -exponent : exponent;
 }
 

@@ -10,8 +10,8 @@
 namespace kilvo::lab {
 
 /// Seconds as "12", "-0.5", "1700010000.123456789" or "1.700010000123456789e+09", exact to the nanosecond; more than 9 decimals
-/// are rounded to the nearest. Nothing when `text` is not entirely a number or is outside +-292 years.
-std::optional<Time> parse_seconds(std::string_view text);
+/// are rounded to the nearest. Nothing when `s` is not entirely a number or is outside +-292 years.
+std::optional<Time> parse_seconds(std::string_view s);
 
 /// Appends `t` in seconds with 9 decimals: 1700010000.123456789.
 void append_seconds(std::string& out, Time t);

@@ -47,7 +47,7 @@ TEST(Evaluate, APerfectEstimateInAnotherWorldHasNoError) {
 
 TEST(Evaluate, AScaleErrorOfOnePercentShowsInEveryLength) {
   const auto scaled = [](double s) { return SE3{line(s).R, 1.01 * line(s).p}; };
-  const auto e = evaluate(sampled(scaled, 40, 200), sampled(line, 40, 1000), Alignment::se3);
+  const auto e = evaluate(sampled(scaled, 40, 100), sampled(line, 40, 200), Alignment::se3);
   const double length = 20.0, error = 0.01 * length;  // evenly spread over +-error/2 about the middle
   EXPECT_NEAR(e.ate_rmse_m, error / std::sqrt(12.0), 1e-4 * error);
   EXPECT_NEAR(e.ate_max_m, error / 2, 1e-9);
@@ -134,9 +134,9 @@ TEST(Evaluate, CoverageGapAndJumpTellOfAHole) {
 TEST(Evaluate, JitterOfAFastTruthIsNotWalkedDistance) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal(0, 1e-4);
-  auto truth = sampled([](double) { return SE3{}; }, 60, 1000);
+  auto truth = sampled([](double) { return SE3{}; }, 20, 1000);
   for (auto& pose : truth) pose.T.p += Vector3d(normal(random), normal(random), normal(random));
-  EXPECT_LT(evaluate(truth, truth, Alignment::se3).path_length_m, 0.2);  // summed pose by pose it would be 14 m
+  EXPECT_LT(evaluate(truth, truth, Alignment::se3).path_length_m, 0.1);  // summed pose by pose it would be 4.5 m
 }
 
 TEST(Evaluate, APauseDoesNotOutweighTheWalk) {
@@ -184,12 +184,12 @@ TEST(Report, JsonHoldsEveryFigure) {
                               [](double s) {
                                 return SE3{line(s).R, 1.01 * line(s).p};
                               },
-                              40, 200),
-                          sampled(line, 40, 1000), Alignment::yaw);
+                              10, 20),
+                          sampled(line, 10, 100), Alignment::yaw);
   const auto json = nlohmann::json::parse(to_json(e));
   EXPECT_EQ(json.size(), 20u);
   EXPECT_EQ(json["align"], "yaw");
-  EXPECT_EQ(json["matches"], 8001);
+  EXPECT_EQ(json["matches"], 201);
   EXPECT_EQ(json["ate_rmse_m"].get<double>(), e.ate_rmse_m);
   EXPECT_EQ(json["rte_1m_percent"].get<double>(), *e.rte_1m_percent);
   EXPECT_EQ(json["e2e_m"].get<double>(), e.e2e_m);

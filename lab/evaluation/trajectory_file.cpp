@@ -15,7 +15,7 @@ namespace kilvo::lab {
 namespace {
 
 constexpr std::size_t columns = 8;
-constexpr std::size_t flush_bytes = 64 * 1024;
+constexpr std::size_t flush_bytes = 65536;
 constexpr double quaternion_norm_tolerance = 0.05;  // files with two decimals pass, swapped columns do not
 
 using Words = std::array<std::string_view, columns>;

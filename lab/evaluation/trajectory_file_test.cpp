@@ -93,6 +93,7 @@ TEST_F(TumFile, WritesAndReadsBackToANanometreAndTheSameBytesTwice) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   std::vector<StampedPose> poses;
+  poses.reserve(5000);
   for (int i = 0; i < 5000; ++i) {
     poses.push_back({time_from_ns(1700010000123456789 + i * 1000003LL),
                      {SO3::Exp(Eigen::Vector3d(normal(random), normal(random), normal(random)) * 2.0),
@@ -117,7 +118,7 @@ TEST_F(TumFile, AWriterThatIsNotClosedStillLeavesItsPoses) {
 
 TEST_F(TumFile, AnUnwritablePathAndAFullDiskAreErrorsThatNameThePath) {
   try {
-    TumWriter(path / "missing" / "a.tum");
+    const TumWriter writer(path / "missing" / "a.tum");
     FAIL();
   } catch (const TrajectoryOutputError& error) {
     EXPECT_THAT(error.what(), HasSubstr((path / "missing" / "a.tum").string()));

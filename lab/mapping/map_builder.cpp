@@ -2,17 +2,18 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace kilvo::lab {
 namespace {
 
-constexpr int chunk_bits = 15;
-constexpr std::size_t chunk_size = std::size_t{1} << chunk_bits;
-constexpr int first_table_bits = 12;
-constexpr double largest_load = 0.65;  // fuller costs probes, each a cache miss; emptier costs memory
+constexpr std::size_t chunk_size = 32768;  // voxels
+constexpr std::size_t table_count = 256;
+constexpr std::size_t first_slots = 16;
 constexpr int axis_bits = 21;
 constexpr std::uint64_t axis_mask = (std::uint64_t{1} << axis_bits) - 1;
 constexpr double axis_offset = 1 << (axis_bits - 1);
@@ -27,6 +28,10 @@ std::uint64_t hash(std::uint64_t key) {
   return key ^ (key >> 33);
 }
 
+/// How full table i may be. Fuller costs probes, each a cache miss; emptier costs memory. No two tables have the same, lest all of them,
+/// which fill evenly, grow in the same call.
+double largest_load(std::size_t i) { return 0.5 + 0.2 * static_cast<double>(i) / table_count; }
+
 std::uint16_t moved(std::uint16_t mean, std::uint16_t towards, float share) {
   const float from = mean;
   return static_cast<std::uint16_t>(std::lrint(from + share * (static_cast<float>(towards) - from)));
@@ -34,29 +39,28 @@ std::uint16_t moved(std::uint16_t mean, std::uint16_t towards, float share) {
 
 }  // namespace
 
-MapBuilder::MapBuilder(const MappingConfig& config)
-    : resolution_(config.resolution), table_(std::size_t{1} << first_table_bits), shift_(64 - first_table_bits) {
+MapBuilder::MapBuilder(const MappingConfig& config) : resolution_(config.resolution), tables_(table_count) {
   if (!(std::isfinite(resolution_) && resolution_ > 0)) throw std::invalid_argument("map.resolution must be a positive length in metres");
+  for (Table& table : tables_) grow(table);
 }
 
 void MapBuilder::add(std::span<const Eigen::Vector4f> points_W) {
   std::array<Voxel, block_size> samples;
-  std::array<std::size_t, block_size> places;
+  std::array<std::uint64_t, block_size> hashes;
   for (std::size_t begin = 0; begin < points_W.size(); begin += block_size) {
     const auto block = points_W.subspan(begin, std::min(block_size, points_W.size() - begin));
-    if (static_cast<double>(size_ + block_size) > largest_load * static_cast<double>(table_.size())) grow_table();
     std::size_t count = 0;
     for (const Eigen::Vector4f& point : block) {
       if (!locate(point, samples[count])) continue;
-      places[count] = place_of(samples[count].key);
-      __builtin_prefetch(&table_[places[count]]);
+      hashes[count] = hash(samples[count].key);
+      __builtin_prefetch(&first_slot(hashes[count]));
       ++count;
     }
     for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t number = table_[places[i]];
+      const std::uint32_t number = first_slot(hashes[i]);
       if (number != 0) __builtin_prefetch(&voxel(number - 1));
     }
-    for (std::size_t i = 0; i < count; ++i) merge(samples[i], places[i]);
+    for (std::size_t i = 0; i < count; ++i) merge(samples[i], hashes[i]);
     dropped_ += block.size() - count;
   }
 }
@@ -77,9 +81,11 @@ bool MapBuilder::locate(const Eigen::Vector4f& point_W, Voxel& sample) const {
   return true;
 }
 
-void MapBuilder::merge(const Voxel& sample, std::size_t place) {
-  for (; table_[place] != 0; place = (place + 1) & (table_.size() - 1)) {
-    Voxel& known = chunks_[(table_[place] - 1) >> chunk_bits][(table_[place] - 1) & (chunk_size - 1)];
+void MapBuilder::merge(const Voxel& sample, std::uint64_t hashed) {
+  Table& table = tables_[hashed % table_count];
+  std::size_t place = hashed >> table.shift;
+  for (; table.slots[place] != 0; place = (place + 1) & (table.slots.size() - 1)) {
+    Voxel& known = voxel(table.slots[place] - 1);
     if (known.key != sample.key) continue;
     if (known.count == most_averaged) return;
     ++known.count;
@@ -89,30 +95,38 @@ void MapBuilder::merge(const Voxel& sample, std::size_t place) {
     return;
   }
   append(sample);
-  table_[place] = static_cast<std::uint32_t>(size_);
+  table.slots[place] = static_cast<std::uint32_t>(size_);
+  if (++table.used > table.limit) grow(table);
 }
 
 void MapBuilder::append(const Voxel& sample) {
-  if ((size_ & (chunk_size - 1)) == 0) chunks_.push_back(std::make_unique_for_overwrite<Voxel[]>(chunk_size));
-  chunks_.back()[size_ & (chunk_size - 1)] = sample;
+  if (size_ % chunk_size == 0) chunks_.push_back(std::make_unique_for_overwrite<Voxel[]>(chunk_size));
+  chunks_.back()[size_ % chunk_size] = sample;
   ++size_;
 }
 
-void MapBuilder::grow_table() {
-  const std::size_t wanted = 2 * table_.size();
-  table_ = std::vector<std::uint32_t>();  // first, so that old and new never exist together: the voxels know their keys
-  table_.resize(wanted);
-  --shift_;
-  for (std::size_t i = 0; i < size_; ++i) {
-    std::size_t place = place_of(voxel(i).key);
-    while (table_[place] != 0) place = (place + 1) & (table_.size() - 1);
-    table_[place] = static_cast<std::uint32_t>(i + 1);
+void MapBuilder::grow(Table& table) {
+  const std::vector<std::uint32_t> old = std::move(table.slots);
+  const std::size_t slots = std::max(first_slots, 2 * old.size());
+  table.slots.assign(slots, 0);
+  table.shift = 64 - std::countr_zero(slots);
+  table.limit = static_cast<std::size_t>(largest_load(static_cast<std::size_t>(&table - tables_.data())) * static_cast<double>(slots));
+  for (const std::uint32_t number : old) {
+    if (number == 0) continue;
+    std::size_t place = hash(voxel(number - 1).key) >> table.shift;
+    while (table.slots[place] != 0) place = (place + 1) & (slots - 1);
+    table.slots[place] = number;
   }
 }
 
-std::size_t MapBuilder::place_of(std::uint64_t key) const { return hash(key) >> shift_; }
+const std::uint32_t& MapBuilder::first_slot(std::uint64_t hashed) const {
+  const Table& table = tables_[hashed % table_count];
+  return table.slots[hashed >> table.shift];
+}
 
-const MapBuilder::Voxel& MapBuilder::voxel(std::size_t i) const { return chunks_[i >> chunk_bits][i & (chunk_size - 1)]; }
+const MapBuilder::Voxel& MapBuilder::voxel(std::size_t i) const { return chunks_[i / chunk_size][i % chunk_size]; }
+
+MapBuilder::Voxel& MapBuilder::voxel(std::size_t i) { return chunks_[i / chunk_size][i % chunk_size]; }
 
 Eigen::Vector4f MapBuilder::point(std::size_t i) const {
   assert(i < size_);
@@ -127,8 +141,9 @@ Eigen::Vector4f MapBuilder::point(std::size_t i) const {
 }
 
 std::size_t MapBuilder::memory_bytes() const {
-  return sizeof(*this) + chunks_.size() * chunk_size * sizeof(Voxel) + chunks_.capacity() * sizeof(chunks_[0]) +
-         table_.capacity() * sizeof(table_[0]);
+  std::size_t bytes = sizeof(*this) + chunks_.size() * chunk_size * sizeof(Voxel) + tables_.size() * sizeof(Table);
+  for (const Table& table : tables_) bytes += table.slots.capacity() * sizeof(std::uint32_t);
+  return bytes;
 }
 
 }  // namespace kilvo::lab

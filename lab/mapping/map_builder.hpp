@@ -24,8 +24,8 @@ struct MappingConfig {
 
 /// One point per voxel: the mean of the first 32 that fell into it. A mean is smoother than the first point (walls get thinner than the
 /// LiDAR's noise), and because it is then left alone, a later pass that has drifted neither blurs nor moves what is there. The result
-/// depends on the points and their order only. Memory: 24 bytes per point kept, and 6 to 13 for finding it; storage grows in pieces of 768
-/// KiB.
+/// depends on the points and their order only. Memory: 24 bytes per point kept and about 10 for finding it; it grows in small pieces, so
+/// that no call waits long for it and the old and the new never lie side by side.
 class MapBuilder {
  public:
   /// Throws std::invalid_argument when the resolution is not a positive length.
@@ -52,19 +52,27 @@ class MapBuilder {
     float intensity;            // their mean
   };
 
+  /// Open addressing: number of a voxel + 1, 0 where empty.
+  struct Table {
+    std::vector<std::uint32_t> slots;
+    std::size_t used = 0;
+    std::size_t limit = 0;  // of `used`
+    int shift = 64;         // a hash >> shift is a slot
+  };
+
   bool locate(const Eigen::Vector4f& point_W, Voxel& sample) const;
-  void merge(const Voxel& sample, std::size_t place);
+  void merge(const Voxel& sample, std::uint64_t hashed);
   void append(const Voxel& sample);
-  void grow_table();
-  std::size_t place_of(std::uint64_t key) const;
+  void grow(Table& table);
+  const std::uint32_t& first_slot(std::uint64_t hashed) const;
   const Voxel& voxel(std::size_t i) const;
+  Voxel& voxel(std::size_t i);
 
   double resolution_;
   std::size_t size_ = 0;
   std::uint64_t dropped_ = 0;
-  std::vector<std::unique_ptr<Voxel[]>> chunks_;  // never moved: growing needs no second copy
-  std::vector<std::uint32_t> table_;              // open addressing: number of a voxel + 1, 0 where empty
-  int shift_;                                     // a hash >> shift_ is a place in table_
+  std::vector<std::unique_ptr<Voxel[]>> chunks_;  // never moved
+  std::vector<Table> tables_;                     // many small ones, grown one at a time
 };
 
 }  // namespace kilvo::lab
