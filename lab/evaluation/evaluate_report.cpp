@@ -10,7 +10,8 @@ namespace {
 nlohmann::json or_null(const std::optional<double>& value) { return value ? nlohmann::json(*value) : nlohmann::json(); }
 
 std::string length(double metres) {
-  return std::abs(metres) < 1.0 ? fmt::format("{:.2f} mm", 1e3 * metres) : fmt::format("{:.3f} m", metres);
+  if (std::abs(metres) >= 1.0) return fmt::format("{:.3f} m", metres);
+  return fmt::format("{:.2f} mm", std::round(1e5 * metres) / 100 + 0.0);  // + 0.0: no "-0.00"
 }
 
 std::string length(const std::optional<double>& metres) { return metres ? length(*metres) : "unknown (too short)"; }

@@ -214,6 +214,8 @@ TEST(Report, TextReadsInMillimetresAndMetres) {
   EXPECT_THAT(text, HasSubstr("2350 of 2351 estimates, 99.8 % of 235.0 s, path 35.22 m, aligned by se3"));
   EXPECT_THAT(text, HasSubstr("rmse 4.60 mm, max 1.250 m"));
   EXPECT_THAT(text, HasSubstr("z -1.20 mm"));
+  e.e2e_z_m = -1e-17;
+  EXPECT_THAT(to_text(e), HasSubstr("z 0.00 mm"));
   EXPECT_THAT(text, HasSubstr("3.20 mm (0.320 %)"));
   EXPECT_THAT(text, HasSubstr("unknown (too short)"));
   EXPECT_THAT(text, HasSubstr("YES (error 1.250 m, limit 1.000 m)"));
