@@ -1,0 +1,44 @@
+// kilvo eval EST.tum GT.tum
+#include <fmt/core.h>
+#include <memory>
+
+#include "apps/cli/exit_code.hpp"
+#include "apps/cli/verbs.hpp"
+#include "lab/evaluation/evaluate.hpp"
+#include "lab/settings/nearest.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+struct EvalOptions {
+  std::string estimate, truth;
+  std::string align = "se3";
+  bool json = false;
+};
+
+int evaluate_files(const EvalOptions& options) {
+  const auto alignment = lab::alignment_of(options.align);
+  if (!alignment) {
+    const std::vector<std::string> names{"se3", "yaw", "first"};
+    throw UsageError(
+        fmt::format("--align must be se3, yaw or first, not '{}', nearest is '{}'", options.align, lab::nearest(options.align, names)));
+  }
+  const lab::Evaluation result = lab::evaluate(lab::read_tum(options.estimate), lab::read_tum(options.truth), *alignment);
+  fmt::print("{}", options.json ? lab::to_json(result) : lab::to_text(result));
+  return done;
+}
+
+}  // namespace
+
+void add_eval(CLI::App& program, Action& chosen) {
+  auto options = std::make_shared<EvalOptions>();
+  CLI::App* verb = program.add_subcommand("eval", "compare a trajectory with the truth");
+  verb->add_option("EST", options->estimate, "estimated trajectory (TUM: t x y z qx qy qz qw)")->required();
+  verb->add_option("GT", options->truth, "true trajectory (TUM), of the same body")->required();
+  verb->add_option("--align", options->align,
+                   "se3 (6 degrees of freedom, the default), yaw (position and heading), first (the first poses coincide)");
+  verb->add_flag("--json", options->json, "print one JSON object");
+  verb->callback([options, &chosen] { chosen = [options] { return evaluate_files(*options); }; });
+}
+
+}  // namespace kilvo::cli

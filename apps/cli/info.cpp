@@ -1,0 +1,66 @@
+// kilvo info INPUT
+#include <algorithm>
+#include <fmt/core.h>
+#include <memory>
+
+#include "apps/cli/exit_code.hpp"
+#include "apps/cli/sensor_choice.hpp"
+#include "apps/cli/shipped_config.hpp"
+#include "apps/cli/verbs.hpp"
+#include "lab/recordings/description.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+struct InfoOptions {
+  std::string input, config;
+};
+
+std::string use_of(const lab::TopicDescription& topic) {
+  if (topic.used_for) return fmt::format("{}{}", name_of(*topic.used_for), is_supported(*topic.used_for) ? "" : " (not by this version)");
+  return topic.fits ? fmt::format("- (could be {})", name_of(*topic.fits)) : "-";
+}
+
+void print_topics(const lab::RecordingDescription& about) {
+  std::size_t topic_width = 5, type_width = 4;
+  for (const lab::TopicDescription& topic : about.topics) {
+    topic_width = std::max(topic_width, topic.topic.size());
+    type_width = std::max(type_width, topic.type.size());
+  }
+  fmt::print("{:<{}}  {:<{}}  {:>9}  {:>8}  {:>7}  {}\n", "topic", topic_width, "type", type_width, "messages", "rate Hz", "gap s", "use");
+  for (const lab::TopicDescription& topic : about.topics) {
+    fmt::print("{:<{}}  {:<{}}  {:>9}  {:>8.2f}  {:>7.3f}  {}\n", topic.topic, topic_width, topic.type, type_width, topic.count, topic.rate,
+               topic.largest_gap, use_of(topic));
+    if (!topic.detail.empty()) fmt::print("{:<{}}  {}\n", "", topic_width, topic.detail);
+  }
+}
+
+int info(const InfoOptions& options) {
+  const auto config = config_file(options.config.empty() ? std::nullopt : std::optional(options.config));
+  const lab::Settings settings = lab::load_settings(config);
+  lab::RecordingOptions wanted;
+  for (const Sensor sensor : every_sensor) {
+    wanted[sensor].use = settings.has(sensor);
+    wanted[sensor].topic = settings.topic(sensor);
+  }
+  const lab::RecordingDescription about = lab::describe_recording(options.input, wanted);
+  fmt::print("{}: {:.1f} MB, {:.3f} s, {} messages in {} chunks ({})\n", about.file, static_cast<double>(about.bytes) * 1e-6,
+             to_seconds(about.end - about.begin), about.messages, about.chunks, about.compression);
+  fmt::print("use: with {}\n", config.string());
+  print_topics(about);
+  for (const lab::Damage& damage : about.damages) fmt::print("damaged at byte {}: {}\n", damage.offset, damage.reason);
+  return done;
+}
+
+}  // namespace
+
+void add_info(CLI::App& program, Action& chosen) {
+  auto options = std::make_shared<InfoOptions>();
+  CLI::App* verb = program.add_subcommand("info", "what is in a recording, and what it would be used for");
+  verb->add_option("INPUT", options->input, "ROS 1 bag, or a folder with recording.bag in it")->required();
+  verb->add_option("--config", options->config, "configuration that says what topics are used for; default: the shipped robots/g1.yaml")
+      ->type_name("FILE");
+  verb->callback([options, &chosen] { chosen = [options] { return info(*options); }; });
+}
+
+}  // namespace kilvo::cli

@@ -1,0 +1,80 @@
+// kilvo: the door for a person at a command line.
+#include <fmt/core.h>
+#include <new>
+#include <string_view>
+
+#include "apps/cli/exit_code.hpp"
+#include "apps/cli/verbs.hpp"
+#include "apps/cli/words.hpp"
+#include "lab/evaluation/align.hpp"
+#include "lab/evaluation/trajectory_file.hpp"
+#include "lab/mapping/output_error.hpp"
+#include "lab/messages/input_error.hpp"
+#include "lab/settings/settings.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+int parse_and_do(const std::vector<std::string>& words) {
+  CLI::App program("Odometry and a map for humanoid robots, from their legs, inertial unit, LiDAR and camera.", "kilvo");
+  program.set_help_flag("--help,-h", "what can be done, and how");
+  program.set_version_flag("--version", "kilvo " KILVO_VERSION);
+  program.require_subcommand(0, 1);
+  Action chosen;
+  add_run(program, chosen);
+  add_info(program, chosen);
+  add_eval(program, chosen);
+  add_config(program, chosen);
+  check_words(words, program);
+  try {
+    program.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+  } catch (const CLI::Success& asked) {  // --help, --version
+    return program.exit(asked);
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(error.what());
+  }
+  if (!chosen) {
+    fmt::print(stderr, "{}", program.help());
+    throw UsageError("nothing to do: say a verb");
+  }
+  return chosen();
+}
+
+int fail(ExitCode code, std::string_view why) {
+  // One line, whatever a library put into its message.
+  std::string line(why);
+  for (char& c : line) {
+    if (c == '\n' || c == '\r') c = ' ';
+  }
+  fmt::print(stderr, "kilvo: error: {}\n", line);
+  return code;
+}
+
+int run_program(const std::vector<std::string>& words) {
+  try {
+    return parse_and_do(words);
+  } catch (const UsageError& e) {
+    return fail(wrong_usage, e.what());
+  } catch (const lab::ConfigError& e) {
+    return fail(wrong_usage, e.what());
+  } catch (const lab::OutputError& e) {
+    return fail(wrong_usage, e.what());
+  } catch (const lab::TrajectoryOutputError& e) {
+    return fail(wrong_usage, e.what());
+  } catch (const lab::InputError& e) {
+    return fail(unusable_input, e.what());
+  } catch (const lab::TrajectoryError& e) {
+    return fail(unusable_input, e.what());
+  } catch (const lab::EvaluationError& e) {
+    return fail(unusable_input, e.what());
+  } catch (const std::bad_alloc&) {
+    return fail(run_failed, "out of memory");
+  } catch (const std::exception& e) {
+    return fail(run_failed, e.what());
+  }
+}
+
+}  // namespace
+}  // namespace kilvo::cli
+
+int main(int argc, char** argv) { return kilvo::cli::run_program({argv + 1, argv + argc}); }

@@ -1,0 +1,64 @@
+// What is to be remembered of the outputs of a run once they are written.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "kilvo/estimator/output.hpp"
+#include "kilvo/sensors/time.hpp"
+
+namespace kilvo::cli {
+
+struct Quantiles {
+  double p50 = 0, p99 = 0, max = 0;
+  std::size_t n = 0;
+};
+
+/// How long the stages took. Four bytes for each entry.
+class StageClock {
+ public:
+  void add(std::string_view stage, double microseconds);
+  std::map<std::string, Quantiles> quantiles() const;
+  /// Over all stages, microseconds; `contact` is a part of `kinematic` and not counted again.
+  double total() const;
+
+ private:
+  std::map<std::string, std::vector<float>, std::less<>> times_;
+};
+
+struct StampedState {
+  Time t{};
+  SE3 T_WI;
+};
+
+class Recap {
+ public:
+  void add(const Output& output);
+
+  StageClock stages;
+
+  std::size_t outputs() const { return outputs_; }
+  std::size_t sweeps() const { return sweeps_; }
+  const std::optional<StampedState>& first() const { return first_; }
+  const std::optional<StampedState>& last() const { return last_; }
+  /// Of the way through the sweeps, or through ten poses a second where there are none: jitter in between adds nothing.
+  double path_length() const { return path_length_; }
+  double start_to_end() const { return first_ ? (last_->T_WI.p - first_->T_WI.p).norm() : 0; }
+  const std::map<std::string, double>& modality_seconds() const { return modality_seconds_; }
+  /// Why the trajectory cannot be right; empty when nothing speaks against it.
+  const std::string& absurdity() const { return absurdity_; }
+
+ private:
+  void judge(const Output& output);
+
+  std::size_t outputs_ = 0, sweeps_ = 0;
+  std::optional<StampedState> first_, last_, last_on_path_;
+  double path_length_ = 0;
+  std::map<std::string, double> modality_seconds_;
+  std::string absurdity_;
+};
+
+}  // namespace kilvo::cli

@@ -1,0 +1,79 @@
+#include "apps/cli/result_files.hpp"
+
+#include <fmt/format.h>
+
+#include "lab/evaluation/decimal_time.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+constexpr const char* state_columns =
+    "t,vx,vy,vz,bgx,bgy,bgz,bax,bay,baz,gx,gy,gz,tau,pclx,pcly,pclz,pcrx,pcry,pcrz,spx,spy,spz,srx,sry,srz";
+// Where no sweep says when a row is due.
+constexpr Duration state_period = std::chrono::milliseconds(20);
+
+void append(std::string& line, const Eigen::Vector3d& v) {
+  fmt::format_to(std::back_inserter(line), ",{:.9g},{:.9g},{:.9g}", v.x(), v.y(), v.z());
+}
+
+}  // namespace
+
+ResultFiles::ResultFiles(const std::filesystem::path& folder)
+    : odometry_(folder / "odometry.tum"),
+      sweeps_(folder / "sweeps.tum"),
+      states_(folder / "states.csv", state_columns),
+      modality_(folder / "modality.csv", "t,modality,cause"),
+      timing_(folder / "timing.csv", "t,stage,microseconds") {}
+
+void ResultFiles::write(const Output& output) {
+  const lab::StampedPose pose{output.t, output.x.pose()};
+  odometry_.write(pose);
+  if (output.is_sweep) sweeps_.write(pose);
+  const bool without_lidar = output.modality == Modality::ki || output.modality == Modality::coast;
+  if (output.is_sweep || (without_lidar && (!last_state_ || output.t - *last_state_ >= state_period))) write_state(output);
+  if (output.modality != last_modality_) write_modality(output);
+  if (output.is_sweep) write_stages(output);
+  recap_.add(output);
+}
+
+void ResultFiles::write_state(const Output& output) {
+  const State& x = output.x;
+  std::string line;
+  lab::append_seconds(line, output.t);
+  for (const Eigen::Vector3d& v : {x.v, x.bg, x.ba, x.g}) append(line, v);
+  fmt::format_to(std::back_inserter(line), ",{:.9g}", x.tau);
+  for (const Eigen::Vector3d& v : x.pc) append(line, v);
+  const Eigen::Matrix<double, at::size, 1> sigma = output.P.diagonal().cwiseMax(0).cwiseSqrt();
+  append(line, sigma.segment<3>(at::p));
+  append(line, sigma.segment<3>(at::R));
+  states_.write(line);
+  last_state_ = output.t;
+}
+
+void ResultFiles::write_modality(const Output& output) {
+  std::string line;
+  lab::append_seconds(line, output.t);
+  modality_.write(fmt::format("{},{},{}", line, name_of(output.modality), last_modality_ ? "change of sensors" : "start"));
+  last_modality_ = output.modality;
+}
+
+void ResultFiles::write_stages(const Output& output) {
+  const std::pair<const char*, double> stages[] = {
+      {"lidar", output.stages.lidar_us}, {"map", output.stages.map_us}, {"other", output.stages.other_us}};
+  std::string t;
+  lab::append_seconds(t, output.t);
+  for (const auto& [stage, microseconds] : stages) {
+    timing_.write(fmt::format("{},{},{:.1f}", t, stage, microseconds));
+    recap_.stages.add(stage, microseconds);
+  }
+}
+
+void ResultFiles::close() {
+  odometry_.close();
+  sweeps_.close();
+  states_.close();
+  modality_.close();
+  timing_.close();
+}
+
+}  // namespace kilvo::cli

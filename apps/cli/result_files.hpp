@@ -1,0 +1,36 @@
+// The files of a run, written as the outputs come.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "apps/cli/csv_file.hpp"
+#include "apps/cli/recap.hpp"
+#include "kilvo/estimator/output.hpp"
+#include "lab/evaluation/trajectory_file.hpp"
+
+namespace kilvo::cli {
+
+class ResultFiles {
+ public:
+  /// Throws lab::OutputError or lab::TrajectoryOutputError, as do write() and close().
+  explicit ResultFiles(const std::filesystem::path& folder);
+
+  void write(const Output& output);
+  void close();
+
+  const Recap& recap() const { return recap_; }
+
+ private:
+  void write_state(const Output& output);
+  void write_modality(const Output& output);
+  void write_stages(const Output& output);
+
+  lab::TumWriter odometry_, sweeps_;
+  CsvFile states_, modality_, timing_;
+  std::optional<Modality> last_modality_;
+  std::optional<Time> last_state_;
+  Recap recap_;
+};
+
+}  // namespace kilvo::cli

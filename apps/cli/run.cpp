@@ -1,0 +1,66 @@
+// kilvo run INPUT --out DIR
+#include <cmath>
+#include <fmt/core.h>
+#include <memory>
+
+#include "apps/cli/exit_code.hpp"
+#include "apps/cli/run_recording.hpp"
+#include "apps/cli/sensor_choice.hpp"
+#include "apps/cli/verbs.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+struct RunWords {
+  RunOptions options;
+  std::string out, sensors, map, config;
+  std::vector<std::string> drops;
+  bool no_map = false;
+  int threads = 0;
+};
+
+int run(RunWords words) {
+  RunOptions& options = words.options;
+  options.out = words.out;
+  if (!words.config.empty()) options.config = words.config;
+  if (!words.sensors.empty()) options.sensors = parse_sensors(words.sensors);
+  for (const std::string& text : words.drops) options.drops.push_back(parse_drop(text));
+  if (words.no_map && !words.map.empty()) throw UsageError("--map and --no-map exclude each other");
+  if (!words.map.empty()) options.map = words.map;
+  options.with_map = !words.no_map;
+  if (!(options.start >= 0) || std::isinf(options.start)) throw UsageError("--start must be a number of seconds, 0 or more");
+  if (!(options.duration > 0)) throw UsageError("--duration must be a number of seconds above 0");
+  return run_recording(options);
+}
+
+}  // namespace
+
+void add_run(CLI::App& program, Action& chosen) {
+  auto words = std::make_shared<RunWords>();
+  RunOptions& options = words->options;
+  CLI::App* verb = program.add_subcommand("run", "estimate trajectory and map from a recording");
+  verb->add_option("INPUT", options.input, "ROS 1 bag, or a folder with recording.bag in it")->required();
+  verb->add_option("--out", words->out, "folder for the results, created if need be")->type_name("DIR")->required();
+  verb->add_option("--config", words->config, "robot, sensors, topics and tuning; default: the shipped robots/g1.yaml")->type_name("FILE");
+  verb->add_option("--set", options.overrides, "override one setting, repeatable (lidar.voxel_size=0.2)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  verb->add_option("--sensors", words->sensors, "use only these of legs,imu,lidar,camera; default: all that are configured and recorded")
+      ->type_name("LIST");
+  verb->add_option("--drop", words->drops,
+                   "leave out a sensor's messages between two times (lidar:10-16; lidar:10- to the end), repeatable")
+      ->type_name("SENSOR:T0-T1")
+      ->allow_extra_args(false);
+  verb->add_option("--start", options.start, "begin this many seconds into the recording")->type_name("S");
+  verb->add_option("--duration", options.duration, "end after this many seconds")->type_name("S");
+  verb->add_option("--map", words->map, "write the map there instead of DIR/map.ply")->type_name("FILE.ply");
+  verb->add_flag("--no-map", words->no_map, "write no map");
+  verb->add_flag("--no-deskew", options.no_deskew, "take each cloud at its stamp, as if its points had been measured at once");
+  verb->add_option("--threads", words->threads, "default: all cores; results do not depend on it")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1024));
+  verb->add_flag("--quiet", options.quiet, "no progress, only warnings and errors");
+  verb->callback([words, &chosen] { chosen = [words] { return run(*words); }; });
+}
+
+}  // namespace kilvo::cli

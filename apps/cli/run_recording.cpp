@@ -1,0 +1,170 @@
+#include "apps/cli/run_recording.hpp"
+
+#include <chrono>
+#include <fmt/core.h>
+
+#include "apps/cli/csv_file.hpp"
+#include "apps/cli/exit_code.hpp"
+#include "apps/cli/interrupt.hpp"
+#include "apps/cli/progress.hpp"
+#include "apps/cli/result_files.hpp"
+#include "apps/cli/sensor_choice.hpp"
+#include "apps/cli/shipped_config.hpp"
+#include "apps/cli/summary.hpp"
+#include "kilvo/estimator/estimator.hpp"
+#include "lab/mapping/ply.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+using WallClock = std::chrono::steady_clock;
+
+double mount_rate(const Robot& robot, Sensor sensor) {
+  const double rates[] = {robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate};
+  return rates[static_cast<std::size_t>(sensor)];
+}
+
+double mount_offset(const Robot& robot, Sensor sensor) {
+  const double offsets[] = {robot.imu.time_offset, robot.legs.time_offset, robot.lidar.time_offset, robot.camera.time_offset};
+  return offsets[static_cast<std::size_t>(sensor)];
+}
+
+lab::RecordingOptions recording_options(const RunOptions& options, const lab::Settings& settings, const std::vector<Sensor>& used) {
+  lab::RecordingOptions out;
+  for (const Sensor sensor : used) {
+    out[sensor] = {true, settings.topic(sensor), mount_rate(settings.robot, sensor), mount_offset(settings.robot, sensor)};
+  }
+  out.no_deskew = options.no_deskew;
+  out.start = options.start;
+  out.duration = options.duration;
+  out.drops = options.drops;
+  return out;
+}
+
+std::array<bool, sensor_count> as_flags(const std::vector<Sensor>& sensors) {
+  std::array<bool, sensor_count> out{};
+  for (const Sensor s : sensors) out[static_cast<std::size_t>(s)] = true;
+  return out;
+}
+
+void tell_start(const RunFacts& facts, const lab::RecordingSource& source, bool no_deskew) {
+  fmt::print(stderr, "kilvo: configuration {}\n", facts.config_file);
+  for (const Sensor sensor : facts.sensors) {
+    std::string detail;
+    if (sensor == Sensor::lidar) detail = no_deskew ? ", each cloud taken at its stamp" : ", point time: " + source.point_time().text();
+    fmt::print(stderr, "kilvo: {} from {}{}\n", name_of(sensor), source.topic(sensor), detail);
+  }
+}
+
+/// Everything between the first message and the last file.
+class Run {
+ public:
+  Run(const RunOptions& options, lab::Settings settings, SensorChoice choice, RunFacts facts)
+      : options_(options),
+        settings_(std::move(settings)),
+        facts_(std::move(facts)),
+        source_(options.input, recording_options(options, settings_, choice.used)),
+        estimator_(settings_.robot, settings_.estimator, as_flags(choice.used)),
+        map_(settings_.mapping),
+        files_(options.out),
+        progress_(Progress::style_for(options.quiet)) {
+    if (!options.quiet) tell_start(facts_, source_, options.no_deskew);
+  }
+
+  int all() {
+    const auto begin = WallClock::now();
+    const bool interrupted = replay();
+    progress_.finish();
+    files_.close();
+    facts_.failure = failure(interrupted);
+    if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map_);
+    facts_.map_points = map_.size();
+    facts_.wall_seconds = std::chrono::duration<double>(WallClock::now() - begin).count();
+    facts_.data_seconds = first_ ? to_seconds(last_ - *first_) : 0;
+    write_text_file(options_.out / "summary.json", summary_json(facts_, settings_, source_, estimator_.statistics(), files_.recap()));
+    tell_end();
+    return facts_.failure.empty() ? done : run_failed;
+  }
+
+ private:
+  // True when the user stopped it.
+  bool replay() {
+    InterruptWatch interrupt;
+    bool interrupted = false;
+    while (auto measurement = source_.next()) {
+      last_ = std::max(last_, stamp_of(*measurement));
+      if (!first_) first_ = last_;
+      keep(estimator_.push(*std::move(measurement)));
+      progress_.update(source_.progress(), [this] { return progress_note(); });
+      interrupted = interrupt.requested();
+      if (interrupted) break;
+    }
+    keep(estimator_.finish());
+    return interrupted;
+  }
+
+  void keep(const std::vector<Output>& outputs) {
+    for (const Output& output : outputs) {
+      files_.write(output);
+      if (options_.with_map && output.is_sweep) map_.add(output.points_W);
+    }
+  }
+
+  std::string progress_note() const {
+    if (!estimator_.initialised()) return estimator_.waiting_for();
+    const Recap& recap = files_.recap();
+    return fmt::format("{} sweeps, {:.1f} m", recap.sweeps(), recap.path_length());
+  }
+
+  std::string failure(bool interrupted) const {
+    const Recap& recap = files_.recap();
+    const bool with_lidar = source_.topic(Sensor::lidar) != "";
+    if (interrupted) return "stopped by the user";
+    if (recap.outputs() == 0) {
+      const std::string why = estimator_.waiting_for();
+      return "nothing was estimated: " + (why.empty() ? "no measurements" : "still " + why);
+    }
+    if (!recap.absurdity().empty()) return "diverged: " + recap.absurdity();
+    if (estimator_.statistics().diverged) return "diverged: the estimator lost itself";
+    if (with_lidar && recap.sweeps() == 0) return "no LiDAR scan could be used";
+    return "";
+  }
+
+  void tell_end() const {
+    const Recap& recap = files_.recap();
+    for (const std::string& text : all_warnings(facts_, source_, estimator_.statistics())) fmt::print(stderr, "kilvo: warning: {}\n", text);
+    if (!facts_.failure.empty()) fmt::print(stderr, "kilvo: error: {}\n", facts_.failure);
+    if (options_.quiet) return;
+    fmt::print("{}: {} poses, {} sweeps, path {:.2f} m, start to end {:.3f} m, {:.1f} s of data in {:.2f} s\n", options_.out.string(),
+               recap.outputs(), recap.sweeps(), recap.path_length(), recap.start_to_end(), facts_.data_seconds, facts_.wall_seconds);
+  }
+
+  const RunOptions& options_;
+  lab::Settings settings_;
+  RunFacts facts_;
+  lab::RecordingSource source_;
+  Estimator estimator_;
+  lab::MapBuilder map_;
+  ResultFiles files_;
+  Progress progress_;
+  std::optional<Time> first_;
+  Time last_ = Time::min();
+};
+
+}  // namespace
+
+int run_recording(const RunOptions& options) {
+  const std::filesystem::path config = config_file(options.config);
+  lab::Settings settings = lab::load_settings(config, options.overrides);
+  prepare_folder(options.out);
+  SensorChoice choice = choose_sensors(options.sensors, settings, config.string(), options.input);
+  lab::require_complete(settings, choice.used);
+  RunFacts facts;
+  facts.input = options.input;
+  facts.config_file = config.string();
+  facts.sensors = choice.used;
+  facts.warnings = choice.warnings;
+  return Run(options, std::move(settings), std::move(choice), std::move(facts)).all();
+}
+
+}  // namespace kilvo::cli

@@ -1,0 +1,33 @@
+// A recording in; a trajectory, a map and a summary out.
+#pragma once
+
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lab/recordings/recording_source.hpp"
+
+namespace kilvo::cli {
+
+struct RunOptions {
+  std::string input;
+  std::filesystem::path out;
+  std::optional<std::string> config;  // the shipped one of the G1 by default
+  std::vector<std::string> overrides;
+  std::optional<std::vector<Sensor>> sensors;
+  std::vector<lab::DropInterval> drops;
+  double start = 0;                                           // s from the recording's beginning
+  double duration = std::numeric_limits<double>::infinity();  // s
+  std::optional<std::filesystem::path> map;                   // out/map.ply by default
+  bool with_map = true;
+  bool no_deskew = false;
+  bool quiet = false;
+};
+
+/// Writes the files of interface.md into options.out. Returns `done` or `run_failed`; everything is written in both cases. Throws, before
+/// anything is written, what main() turns into the other exit codes.
+int run_recording(const RunOptions& options);
+
+}  // namespace kilvo::cli

@@ -1,0 +1,139 @@
+#include "apps/cli/sensor_choice.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fmt/core.h>
+#include <limits>
+#include <set>
+
+#include "apps/cli/exit_code.hpp"
+#include "lab/messages/input_error.hpp"
+#include "lab/recordings/recording_file.hpp"
+#include "lab/settings/nearest.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+Sensor parse_sensor(const std::string& name) {
+  std::vector<std::string> names;
+  for (const Sensor sensor : every_sensor) {
+    names.emplace_back(name_of(sensor));
+    if (name == names.back()) return sensor;
+  }
+  throw UsageError(fmt::format("no sensor '{}', nearest is '{}' (sensors: imu, legs, lidar, camera)", name, lab::nearest(name, names)));
+}
+
+// Takes a number of seconds from the beginning of `text`.
+std::optional<double> take_seconds(std::string_view& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || !std::isfinite(value) || value < 0) return std::nullopt;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return value;
+}
+
+std::string unsupported(Sensor sensor) { return fmt::format("the sensor '{}' is not supported by this version", name_of(sensor)); }
+
+std::vector<Sensor> as_wanted(const std::vector<Sensor>& wanted, const lab::Settings& settings, const std::string& config) {
+  if (std::ranges::find(wanted, Sensor::imu) == wanted.end())
+    throw UsageError("--sensors: the imu is needed, nothing is estimated without it");
+  for (const Sensor sensor : wanted) {
+    if (!is_supported(sensor)) throw UsageError(unsupported(sensor));
+    if (!settings.has(sensor))
+      throw UsageError(fmt::format("{}: {}.topic is missing: the sensor '{}' is not configured", config, name_of(sensor), name_of(sensor)));
+  }
+  return wanted;
+}
+
+std::set<std::string> topics_of(const std::string& input) {
+  std::set<std::string> out;
+  const lab::Rosbag1Reader reader = lab::open_recording(input);
+  for (const auto& [id, connection] : reader.connections()) out.insert(connection.topic);
+  return out;
+}
+
+std::string first_few(const std::set<std::string>& names) {
+  constexpr std::size_t most = 12;
+  std::string out;
+  std::size_t count = 0;
+  for (const std::string& name : names) {
+    if (count++ == most) return out + ", ...";
+    out += (out.empty() ? "" : ", ") + name;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<Sensor> parse_sensors(const std::string& list) {
+  std::set<Sensor> out;
+  for (std::size_t begin = 0; begin <= list.size();) {
+    const std::size_t end = std::min(list.find(',', begin), list.size());
+    out.insert(parse_sensor(list.substr(begin, end - begin)));
+    begin = end + 1;
+  }
+  return {out.begin(), out.end()};
+}
+
+lab::DropInterval parse_drop(const std::string& text) {
+  const UsageError wrong(fmt::format("--drop {}: must be SENSOR:T0-T1 in seconds, as in lidar:10-16, or lidar:10- (to the end)", text));
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos) throw wrong;
+  lab::DropInterval out;
+  out.sensor = parse_sensor(text.substr(0, colon));
+  std::string_view rest = std::string_view(text).substr(colon + 1);
+  const auto from = take_seconds(rest);
+  if (!from || !rest.starts_with('-')) throw wrong;
+  out.from = *from;
+  rest.remove_prefix(1);
+  if (rest.empty()) return out;
+  const auto until = take_seconds(rest);
+  if (!until || !rest.empty() || *until < *from) throw wrong;
+  out.until = *until;
+  return out;
+}
+
+SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, const lab::Settings& settings, const std::string& config,
+                            const std::string& input) {
+  SensorChoice out;
+  if (wanted) {
+    out.used = as_wanted(*wanted, settings, config);
+    return out;
+  }
+  const std::set<std::string> topics = topics_of(input);
+  if (topics.empty()) throw lab::InputError(fmt::format("{}: holds no messages", input));
+  bool any_present = false, more_configured = false;
+  std::vector<std::string> missing;
+  for (const Sensor sensor : every_sensor) {
+    if (!settings.has(sensor)) continue;
+    const std::string& topic = settings.topic(sensor);
+    const bool present = std::ranges::any_of(topics, [&](const std::string& name) { return lab::topic_matches(sensor, topic, name); });
+    any_present = any_present || present;
+    more_configured = more_configured || sensor != Sensor::imu;
+    if (present && is_supported(sensor)) {
+      out.used.push_back(sensor);
+    } else if (present) {
+      out.warnings.push_back(unsupported(sensor));
+    } else {
+      const std::vector<std::string> names(topics.begin(), topics.end());
+      missing.push_back(fmt::format("no topic {} ({}), nearest is {}", topic, name_of(sensor), lab::nearest(topic, names)));
+      out.warnings.push_back(missing.back());
+    }
+  }
+  if (!any_present) {
+    throw lab::InputError(
+        fmt::format("{}: none of the topics in {} is in it; it has {}; choose another --config", input, config, first_few(topics)));
+  }
+  if (out.used.empty() || out.used.front() != Sensor::imu) {
+    throw lab::InputError(fmt::format("{}: {}", input, missing.empty() ? "no IMU is configured" : missing.front()));
+  }
+  if (out.used.size() == 1 && more_configured) {
+    std::string why;
+    for (const std::string& text : out.warnings) why += text + "; ";
+    throw lab::InputError(fmt::format("{}: nothing but the IMU could be used: {}say --sensors imu if that is what you want", input, why));
+  }
+  return out;
+}
+
+}  // namespace kilvo::cli

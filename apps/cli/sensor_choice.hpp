@@ -1,0 +1,35 @@
+// Which sensors are used.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lab/recordings/recording_source.hpp"
+#include "lab/settings/settings.hpp"
+
+namespace kilvo::cli {
+
+inline constexpr std::array<Sensor, sensor_count> every_sensor{Sensor::imu, Sensor::legs, Sensor::lidar, Sensor::camera};
+
+/// What this version of the estimator can use: the one place that says so.
+constexpr bool is_supported(Sensor sensor) { return sensor == Sensor::imu || sensor == Sensor::lidar; }
+
+/// "imu,lidar" -> sensors. Throws UsageError, naming the nearest, for an unknown one.
+std::vector<Sensor> parse_sensors(const std::string& list);
+
+/// "lidar:10-16", "lidar:10-" (to the end). Throws UsageError.
+lab::DropInterval parse_drop(const std::string& text);
+
+struct SensorChoice {
+  std::vector<Sensor> used;
+  std::vector<std::string> warnings;  // what could have been used and is not, and why
+};
+
+/// The sensors wanted; without a wish those that are configured, supported and in the input. Throws UsageError for a wish that cannot be
+/// fulfilled, InputError when the input has none of the topics configured, or nothing but the IMU where more is configured.
+SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, const lab::Settings& settings, const std::string& config,
+                            const std::string& input);
+
+}  // namespace kilvo::cli

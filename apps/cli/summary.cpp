@@ -1,0 +1,102 @@
+#include "apps/cli/summary.hpp"
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "lab/settings/show_settings.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// The largest the program has been, from the kernel's own book.
+double peak_memory_mb() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmHWM:")) return std::stod(line.substr(6)) / 1024;
+  }
+  return 0;
+}
+
+double tenths(double x) { return std::round(x * 10) / 10; }
+
+Json pose_json(const std::optional<StampedState>& state) {
+  if (!state) return nullptr;
+  const Eigen::Vector3d& p = state->T_WI.p;
+  const Eigen::Quaterniond q = state->T_WI.R.quaternion();
+  return {{"t", to_seconds(state->t.time_since_epoch())}, {"p", {p.x(), p.y(), p.z()}}, {"q_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
+}
+
+Json messages_json(const RunFacts& facts, const lab::RecordingSource& source, const Statistics& statistics) {
+  Json out = Json::object();
+  for (const Sensor sensor : facts.sensors) {
+    const SensorCount& estimator = statistics.sensors[static_cast<std::size_t>(sensor)];
+    std::map<std::string, std::uint64_t> dropped = source.counts(sensor).dropped;
+    for (const auto& [cause, n] : estimator.dropped) dropped[cause] += n;
+    out[name_of(sensor)] = {{"topic", source.topic(sensor)}, {"used", estimator.used}, {"dropped", dropped}};
+  }
+  return out;
+}
+
+Json points_json(const RunFacts& facts, const lab::RecordingSource& source, const Statistics& statistics) {
+  const PointDrops& drops = statistics.points;
+  Json out{{"non_finite", drops.non_finite},
+           {"at_origin", drops.at_origin},
+           {"too_near", drops.too_near},
+           {"too_far", drops.too_far},
+           {"outside_trajectory", drops.outside_trajectory}};
+  out["absurd_time"] = source.counts(Sensor::lidar).absurd_point_times;
+  out["in_map"] = facts.map_points;
+  return out;
+}
+
+Json stages_json(const Recap& recap) {
+  Json out = Json::object();
+  for (const auto& [stage, q] : recap.stages.quantiles()) {
+    out[stage] = {{"p50", tenths(q.p50)}, {"p99", tenths(q.p99)}, {"max", tenths(q.max)}, {"n", q.n}};
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::string> all_warnings(const RunFacts& facts, const lab::RecordingSource& source, const Statistics& statistics) {
+  std::vector<std::string> out = facts.warnings;
+  for (const std::string& text : source.warnings()) out.push_back(text);
+  out.insert(out.end(), statistics.warnings.begin(), statistics.warnings.end());
+  return out;
+}
+
+std::string summary_json(const RunFacts& facts, const lab::Settings& settings, const lab::RecordingSource& source,
+                         const Statistics& statistics, const Recap& recap) {
+  Json json;
+  json["version"] = KILVO_VERSION;
+  json["input"] = facts.input;
+  json["config_file"] = facts.config_file;
+  json["failure"] = facts.failure.empty() ? Json() : Json(facts.failure);
+  json["diverged"] = statistics.diverged || !recap.absurdity().empty();
+  json["input_damaged"] = source.input_damaged();
+  json["messages"] = messages_json(facts, source, statistics);
+  json["points"] = points_json(facts, source, statistics);
+  json["warnings"] = all_warnings(facts, source, statistics);
+  json["rollbacks"] = statistics.rollbacks;
+  json["modality_seconds"] = recap.modality_seconds();
+  json["outputs"] = recap.outputs();
+  json["sweeps"] = recap.sweeps();
+  json["path_length_m"] = recap.path_length();
+  json["first_pose"] = pose_json(recap.first());
+  json["last_pose"] = pose_json(recap.last());
+  json["start_to_end_m"] = recap.start_to_end();
+  json["stage_us"] = stages_json(recap);
+  json["mean_ms_per_frame"] = recap.sweeps() == 0 ? 0 : recap.stages.total() * 1e-3 / static_cast<double>(recap.sweeps());
+  json["data_seconds"] = facts.data_seconds;
+  json["wall_seconds"] = facts.wall_seconds;
+  json["real_time_factor"] = facts.wall_seconds > 0 ? facts.data_seconds / facts.wall_seconds : 0;
+  json["peak_memory_mb"] = tenths(peak_memory_mb());
+  json["config"] = Json::parse(lab::settings_json(settings));
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace kilvo::cli

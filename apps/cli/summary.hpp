@@ -1,0 +1,29 @@
+// summary.json: the run in one file.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/cli/recap.hpp"
+#include "kilvo/estimator/output.hpp"
+#include "lab/recordings/recording_source.hpp"
+#include "lab/settings/settings.hpp"
+
+namespace kilvo::cli {
+
+struct RunFacts {
+  std::string input, config_file;
+  std::vector<Sensor> sensors;
+  std::vector<std::string> warnings;  // of the choice of sensors
+  std::string failure;                // why the run failed; empty when it did not
+  double data_seconds = 0, wall_seconds = 0;
+  std::size_t map_points = 0;
+};
+
+/// All warnings of a run: the choice of sensors, the recording, the estimator.
+std::vector<std::string> all_warnings(const RunFacts& facts, const lab::RecordingSource& source, const Statistics& statistics);
+
+std::string summary_json(const RunFacts& facts, const lab::Settings& settings, const lab::RecordingSource& source,
+                         const Statistics& statistics, const Recap& recap);
+
+}  // namespace kilvo::cli

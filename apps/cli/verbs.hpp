@@ -1,0 +1,18 @@
+// The verbs of the `kilvo` program, one file each. A verb declares its options and, when it is the one on the command line, leaves what
+// is to be done in `chosen`.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+namespace kilvo::cli {
+
+/// Returns the exit code.
+using Action = std::function<int()>;
+
+void add_run(CLI::App& program, Action& chosen);
+void add_info(CLI::App& program, Action& chosen);
+void add_eval(CLI::App& program, Action& chosen);
+void add_config(CLI::App& program, Action& chosen);
+
+}  // namespace kilvo::cli

@@ -1,0 +1,13 @@
+// Mistyped verbs and options, found before CLI11 sees them, so that the nearest valid one can be named.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+namespace kilvo::cli {
+
+/// Throws UsageError at the first word that is no verb or no option of its verb.
+void check_words(const std::vector<std::string>& words, const CLI::App& program);
+
+}  // namespace kilvo::cli

@@ -1,0 +1,127 @@
+#include "lab/settings/check_settings.hpp"
+
+#include <algorithm>
+#include <fmt/core.h>
+
+#include "lab/settings/nearest.hpp"
+#include "lab/settings/setting_list.hpp"
+#include "lab/settings/urdf_names.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
+  return out;
+}
+
+[[noreturn]] void refuse(const Settings& s, const std::string& key, const std::string& why) {
+  const auto given = s.given.find(key);
+  throw ConfigError(fmt::format("{}{}: {}", given == s.given.end() ? "" : given->second + ": ", key, why));
+}
+
+void check_value(const Settings& s, const Setting& setting) {
+  const std::optional<Range> range = range_of(setting.key);
+  const auto check_number = [&](double value) {
+    if (range && !range->contains(value)) refuse(s, setting.key, fmt::format("must be {}, not {}", range->text(), value));
+  };
+  if (const auto* number = std::get_if<double*>(&setting.value)) check_number(**number);
+  if (const auto* number = std::get_if<int*>(&setting.value)) check_number(**number);
+  const std::vector<std::string>& choices = choices_of(setting.key);
+  const auto* text = std::get_if<std::string*>(&setting.value);
+  if (text != nullptr && !choices.empty() && std::ranges::find(choices, **text) == choices.end()) {
+    refuse(s, setting.key, fmt::format("must be one of {}, not '{}', nearest is {}", joined(choices), **text, nearest(**text, choices)));
+  }
+}
+
+void check_together(const Settings& s) {
+  // Which of the two a user touched is where to point at.
+  const auto touched = [&s](const char* one, const char* other) { return s.given.contains(one) ? one : other; };
+  const double cell = s.estimator.lidar.voxel_size, voxel = s.estimator.map.voxel_size;
+  if (cell > voxel / 4 * (1 + 1e-9)) {
+    refuse(s, touched("lidar.voxel_size", "map.voxel_size"),
+           fmt::format("lidar.voxel_size ({}) must be at most a quarter of map.voxel_size ({})", cell, voxel));
+  }
+  const LidarMount& lidar = s.robot.lidar;
+  if (lidar.min_range >= lidar.max_range) {
+    refuse(s, touched("lidar.min_range", "lidar.max_range"),
+           fmt::format("lidar.min_range ({}) must be below lidar.max_range ({})", lidar.min_range, lidar.max_range));
+  }
+  const MapConfig& map = s.estimator.map;
+  if (map.full_points < map.min_points) {
+    refuse(s, touched("map.full_points", "map.min_points"),
+           fmt::format("map.full_points ({}) must not be below map.min_points ({})", map.full_points, map.min_points));
+  }
+  const std::size_t n = s.robot.camera.distortion.size();
+  const bool radtan = s.robot.camera.model == "pinhole_radtan";
+  if (n != 0 && n != 4 && !(radtan && n == 5)) {
+    refuse(s, "camera.distortion", fmt::format("must have {} numbers for {}, not {}", radtan ? "4 or 5" : "4", s.robot.camera.model, n));
+  }
+}
+
+void check_names(const Settings& s) {
+  if (s.robot.urdf.empty()) return;
+  const UrdfNames names = find_urdf_names(s.robot.urdf);
+  if (names.links.empty()) refuse(s, "robot.urdf", fmt::format("{} has no links: not a URDF file", s.urdf_file));
+  const auto check = [&](const std::string& key, const std::string& name, const std::vector<std::string>& valid, const char* what) {
+    if (!name.empty() && std::ranges::find(valid, name) == valid.end()) {
+      refuse(s, key, fmt::format("{} has no {} '{}', nearest is '{}'", s.urdf_file, what, name, nearest(name, valid)));
+    }
+  };
+  for (const Foot& foot : s.robot.feet) check("robot.feet", foot.link, names.links, "link");
+  check("imu.T_link_imu.link", s.robot.imu.link, names.links, "link");
+  for (const std::string& joint : s.robot.locked_joints) check("robot.locked_joints", joint, names.joints, "joint");
+}
+
+// What a sensor cannot do without. Keys with defaults are not in it.
+std::vector<std::string> required_keys(const Settings& s, Sensor sensor) {
+  switch (sensor) {
+    case Sensor::imu:
+      return {"imu.topic"};
+    case Sensor::legs:
+      if (s.robot.legs.type == "feet") return {"legs.topic", "legs.T_imu_feet.p", "legs.T_imu_feet.R"};
+      return {"legs.topic", "robot.urdf", "robot.feet", "imu.T_link_imu.link", "imu.T_link_imu.p", "imu.T_link_imu.R"};
+    case Sensor::lidar:
+      return {"lidar.topic", "lidar.T_imu_lidar.p", "lidar.T_imu_lidar.R"};
+    case Sensor::camera:
+      return {"camera.topic",
+              "camera.T_imu_camera.p",
+              "camera.T_imu_camera.R",
+              "camera.width",
+              "camera.height",
+              "camera.fx",
+              "camera.fy",
+              "camera.cx",
+              "camera.cy"};
+  }
+  return {};
+}
+
+}  // namespace
+
+void check_settings(const Settings& settings) {
+  Settings copy = settings;
+  for (const Setting& setting : list_settings(copy)) {
+    if (settings.given.contains(setting.key)) check_value(settings, setting);
+  }
+  check_together(settings);
+  check_names(settings);
+}
+
+void require_complete(const Settings& settings, std::span<const Sensor> used) {
+  for (const Sensor sensor : used) {
+    for (const std::string& key : required_keys(settings, sensor)) {
+      if (!settings.given.contains(key)) {
+        // The file is the one that any other of the settings came from.
+        std::string file;
+        for (const auto& [other, where] : settings.given) {
+          if (!where.starts_with("--set")) file = where.substr(0, where.rfind(':')) + ": ";
+        }
+        throw ConfigError(fmt::format("{}{} is missing: the sensor '{}' cannot be used without it", file, key, name_of(sensor)));
+      }
+    }
+  }
+}
+
+}  // namespace kilvo::lab

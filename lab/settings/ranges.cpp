@@ -1,0 +1,95 @@
+#include <fmt/core.h>
+#include <limits>
+#include <map>
+#include <optional>
+
+#include "lab/settings/setting_list.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double any = std::numeric_limits<double>::infinity();
+
+constexpr Range up_to(double high) { return {0, high, false}; }
+constexpr Range above_zero(double high = any) { return {0, high, true}; }
+
+// One line per number. Upper limits are where a mistyped unit or a number that no code was made for begins.
+const std::map<std::string_view, Range>& ranges() {
+  static const std::map<std::string_view, Range> table{
+      {"imu.rate", above_zero(100000)},
+      {"imu.time_offset", {-10, 10}},
+      {"imu.gyro_noise", above_zero()},
+      {"imu.accel_noise", above_zero()},
+      {"imu.gyro_bias_walk", up_to(any)},
+      {"imu.accel_bias_walk", up_to(any)},
+      {"legs.rate", above_zero(100000)},
+      {"legs.time_offset", {-10, 10}},
+      {"legs.sole_offset", {-1, 1}},
+      {"legs.foot_noise", up_to(any)},
+      {"lidar.rate", above_zero(1000)},
+      {"lidar.time_offset", {-10, 10}},
+      {"lidar.min_range", up_to(1000)},
+      {"lidar.max_range", above_zero(10000)},
+      {"lidar.range_noise", above_zero(10)},
+      {"lidar.angle_noise", up_to(1)},
+      {"lidar.voxel_size", {0.01, 25}},
+      {"lidar.gate", above_zero()},
+      {"lidar.weak_direction", up_to(any)},
+      {"camera.rate", above_zero(1000)},
+      {"camera.time_offset", {-10, 10}},
+      {"camera.width", {1, 20000}},
+      {"camera.height", {1, 20000}},
+      {"camera.fx", above_zero()},
+      {"camera.fy", above_zero()},
+      {"camera.cx", {-20000, 40000}},
+      {"camera.cy", {-20000, 40000}},
+      {"camera.exposure_walk", up_to(any)},
+      {"map.voxel_size", {0.04, 100}},
+      {"map.min_points", {3, any}},
+      {"map.max_roughness", above_zero()},
+      {"map.full_points", {3, any}},
+      {"map.radius", above_zero(10000)},
+      {"map.max_nodes", {1000, 100000000}},
+      {"map.resolution", {0.001, 100}},
+      {"estimator.max_wait", up_to(60)},
+      {"estimator.max_imu_gap", above_zero(60)},
+      {"estimator.initial.still_time", above_zero(60)},
+      {"estimator.initial.moving_start", above_zero(600)},
+      {"estimator.initial.still_gyro", above_zero()},
+      {"estimator.initial.still_accel", above_zero()},
+      {"estimator.initial.gravity_sigma", above_zero()},
+      {"estimator.initial.gyro_bias_sigma", above_zero()},
+      {"estimator.initial.velocity_sigma", above_zero()},
+      {"estimator.update.max_iterations", {1, 100}},
+      {"estimator.update.rotation_step", above_zero()},
+      {"estimator.update.position_step", above_zero()},
+  };
+  return table;
+}
+
+}  // namespace
+
+std::string Range::text() const {
+  if (low == -any) return high == any ? "any" : fmt::format("at most {}", high);
+  const std::string lower = fmt::format("{} {}", without_low ? "above" : "at least", low);
+  if (high == any) return lower;
+  return without_low ? fmt::format("{}, at most {}", lower, high) : fmt::format("{} to {}", low, high);
+}
+
+std::optional<Range> range_of(std::string_view key) {
+  const auto found = ranges().find(key);
+  if (found == ranges().end()) return std::nullopt;
+  return found->second;
+}
+
+const std::vector<std::string>& choices_of(std::string_view key) {
+  static const std::vector<std::string> none;
+  static const std::map<std::string_view, std::vector<std::string>> table{
+      {"legs.type", {"joints", "feet"}},
+      {"camera.model", {"pinhole_radtan", "equidistant"}},
+  };
+  const auto found = table.find(key);
+  return found == table.end() ? none : found->second;
+}
+
+}  // namespace kilvo::lab
