@@ -232,7 +232,11 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
   const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size);
   const Eigen::Vector3d p_IL = robot_.lidar.T_imu_lidar.p;
-  LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), config_.lidar);
+  LidarConfig lidar = config_.lidar;
+  // With hysteresis: each change of mind would hand what was drifted since to the map.
+  constexpr double to_leave = 3.0;
+  if (degenerate_) lidar.weak_share *= to_leave;
+  LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar);
   estimate_ = map_.empty() ? prior : update(prior, model, config_.update).posterior;
   const bool good = keep_finite();
   StageTimes stages;
@@ -241,10 +245,11 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   const SE3 T_WI = estimate_->x.pose();
   if (good) {
     trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
-    map_error_.registered(T_WI, model.by_epoch());
+    map_error_.registered(T_WI, model.by_epoch(), weak_part(model.report().degeneracy));
     const std::uint32_t epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
     map_.insert(to_world(clusters, T_WI, p_IL, config_.lidar), epoch);
     map_.forget(estimate_->x.p);
+    degenerate_ = model.report().degeneracy.weak_count > 0;
     anchor_ = *estimate_;
     while (imu_.size() > 2 && imu_[1].t <= anchor_.t) imu_.pop_front();
   }

@@ -68,6 +68,7 @@ class Estimator {
   Trajectory trajectory_;
   VoxelMap map_;
   MapError map_error_;
+  bool degenerate_ = false;  // the last sweep had a weak direction
   Statistics statistics_;
 };
 

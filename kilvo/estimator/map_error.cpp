@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <cmath>
 
 namespace kilvo {
 namespace {
@@ -35,9 +36,12 @@ PoseCovariance root_of(const PoseCovariance& M) {
 
 // Pseudo-inverse of the information: a direction that the planes do not know has no error from them.
 PoseCovariance inverse_of_known(const PoseCovariance& A) {
-  const Eigen::Matrix<double, 6, 1> scale = A.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
+  // Rotation and position are brought to the same size; each axis by itself would blow a weak one up.
+  const double rotation = std::sqrt(3.0 / A.topLeftCorner<3, 3>().trace()), position = std::sqrt(3.0 / A.bottomRightCorner<3, 3>().trace());
+  Eigen::Matrix<double, 6, 1> scale;
+  scale << rotation, rotation, rotation, position, position, position;
   const Eigen::SelfAdjointEigenSolver<PoseCovariance> eig(scale.asDiagonal() * A * scale.asDiagonal());
-  constexpr double known = 1e-3;
+  constexpr double known = 1e-6;
   const Eigen::Matrix<double, 6, 1> inverse = eig.eigenvalues().unaryExpr([](double l) { return l > known ? 1.0 / l : 0.0; });
   return scale.asDiagonal() * eig.eigenvectors() * inverse.asDiagonal() * eig.eigenvectors().transpose() * scale.asDiagonal();
 }
@@ -62,16 +66,16 @@ std::uint32_t MapError::epoch_now(const SE3& T_WI, const PoseCovariance& P) {
   return static_cast<std::uint32_t>(epochs_.size() - 1);
 }
 
-void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epochs) {
+void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak) {
   PoseCovariance A = PoseCovariance::Zero();
   for (const EpochInformation& e : epochs) A += e.A;
-  if (!(A.trace() > 0)) return;
+  if (!(A.topLeftCorner<3, 3>().trace() > 0) || !(A.bottomRightCorner<3, 3>().trace() > 0)) return;
   const PoseCovariance inverse = inverse_of_known(A);
   const PoseCovariance G = from_origin(T_WI);
   PoseCovariance root = PoseCovariance::Zero();
   for (const EpochInformation& e : epochs) root += inverse * e.A * root_of(G * epochs_[e.epoch] * G.transpose());
   const PoseCovariance H = to_origin(T_WI);
-  now_ = H * (root * root.transpose()) * H.transpose();
+  now_ = H * (root * root.transpose() + weak * at(T_WI) * weak.transpose()) * H.transpose();
 }
 
 }  // namespace kilvo

@@ -22,8 +22,9 @@ class MapError {
   std::uint32_t epoch_now(const SE3& T_WI, const PoseCovariance& P);
 
   /// A sweep was registered with these informations against planes of each epoch; D becomes what their errors do to the pose. They
-  /// are taken as fully correlated, which bounds it from above.
-  void registered(const SE3& T_WI, std::span<const EpochInformation> epochs);
+  /// are taken as fully correlated, which bounds it from above. Along directions that the sweep did not know (`weak`: a pose error
+  /// to its part along them) D stays what it was.
+  void registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak);
 
  private:
   std::vector<PoseCovariance> epochs_;                    // as twists at the world's origin

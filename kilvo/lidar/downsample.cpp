@@ -18,8 +18,8 @@ PointCluster cluster_of(const Cell& c) {
   const Eigen::Vector3f m = c.sum / c.count;
   out.mean = c.first + m;
   out.count = c.count;
-  out.scatter << c.outer[0] - c.sum.x() * m.x(), c.outer[1] - c.sum.x() * m.y(), c.outer[2] - c.sum.x() * m.z(), c.outer[3] - c.sum.y() * m.y(),
-      c.outer[4] - c.sum.y() * m.z(), c.outer[5] - c.sum.z() * m.z();
+  out.scatter << c.outer[0] - c.sum.x() * m.x(), c.outer[1] - c.sum.x() * m.y(), c.outer[2] - c.sum.x() * m.z(),
+      c.outer[3] - c.sum.y() * m.y(), c.outer[4] - c.sum.y() * m.z(), c.outer[5] - c.sum.z() * m.z();
   return out;
 }
 

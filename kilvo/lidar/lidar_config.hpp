@@ -8,19 +8,21 @@
 namespace kilvo {
 
 struct LidarConfig {
-  double range_noise = 0.02;     // m
-  double angle_noise = 0.001;    // rad
-  double voxel_size = 0.25;      // m
+  double range_noise = 0.02;   // m
+  double angle_noise = 0.001;  // rad
+  double voxel_size = 0.25;    // m
   double gate = 3.0;
-  double weak_direction = 0.03;  // m
+  double weak_share = 0.002;
 
   static constexpr auto fields() {
-    return std::tuple{
-        Field{"range_noise", &LidarConfig::range_noise, "m", "standard deviation of one measured range"},
-        Field{"angle_noise", &LidarConfig::angle_noise, "rad", "standard deviation of one beam's direction, each way"},
-        Field{"voxel_size", &LidarConfig::voxel_size, "m", "points of a sweep in one cell of this size become one row that weighs as much as they do; at most a quarter of map.voxel_size"},
-        Field{"gate", &LidarConfig::gate, "sigma", "rows farther from their plane than this are not used"},
-        Field{"weak_direction", &LidarConfig::weak_direction, "m", "a direction in which one sweep alone knows the position no better than this is not updated"}};
+    return std::tuple{Field{"range_noise", &LidarConfig::range_noise, "m", "standard deviation of one measured range"},
+                      Field{"angle_noise", &LidarConfig::angle_noise, "rad", "standard deviation of one beam's direction, each way"},
+                      Field{"voxel_size", &LidarConfig::voxel_size, "m",
+                            "points of a sweep in one cell of this size become one row that weighs as much as they do; at most a quarter "
+                            "of map.voxel_size"},
+                      Field{"gate", &LidarConfig::gate, "sigma", "rows farther from their plane than this are not used"},
+                      Field{"weak_share", &LidarConfig::weak_share, "-",
+                            "a direction with less than this share of a sweep's information on position is not updated"}};
   }
 };
 

@@ -11,6 +11,9 @@ namespace {
 // A cluster thicker than its noise explains lies on two surfaces: its mean lies on neither.
 constexpr double thickness_sigmas2 = 6.0;
 
+// Beyond this many standard deviations a row's pull stays the same (Huber): posters, edges, things that moved.
+constexpr double robust_sigmas = 1.5;
+
 // The thickness test needs a few points to say anything.
 constexpr float thickness_min_count = 4;
 
@@ -27,9 +30,16 @@ PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, cons
 
 LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL,
                        const PoseCovariance& map_error, const LidarConfig& config)
-    : map_(map), clusters_(clusters), p_IL_(p_IL), map_error_(map_error), config_(config), associations_(clusters.size()), rows_of_node_(map.node_capacity(), 0) {}
+    : map_(map),
+      clusters_(clusters),
+      p_IL_(p_IL),
+      map_error_(map_error),
+      config_(config),
+      associations_(clusters.size()),
+      rows_of_node_(map.node_capacity(), 0) {}
 
-bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P, Association& out) const {
+bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P,
+                        Association& out) const {
   const Plane& plane = *match.plane;
   const Eigen::Vector3d p_I = cluster.mean.cast<double>();
   const Eigen::Vector3d n_W = plane.normal.cast<double>();
@@ -61,7 +71,12 @@ LidarModel::Association LidarModel::associate(const PointCluster& cluster, const
   };
   const Eigen::Vector3d x = T_WI * cluster.mean.cast<double>();
   if (try_at(x)) return found;
-  // The nearest neighbour leaf: across the face that the point is closest to.
+  if (seen) {
+    // Its own voxels hold a surface, and it is another one: no business of the neighbours.
+    ++report_.rejected;
+    return found;
+  }
+  // Nothing known here yet: the nearest neighbour leaf, across the face that the point is closest to.
   const double leaf = map_.leaf_size();
   Eigen::Vector3d offset;
   for (int i = 0; i < 3; ++i) offset[i] = x[i] - (static_cast<double>(fast_floor(x[i] / leaf)) + 0.5) * leaf;
@@ -92,7 +107,9 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
     Association& a = associations_[i];
     if (a.plane == nullptr) continue;
     // k rows of one plane share its error: each carries k times its variance, so that together they average it not at all.
-    const double weight = a.weight = 1.0 / (a.variance + rows_of_node_[a.node] * a.plane_variance);
+    const double variance = a.variance + rows_of_node_[a.node] * a.plane_variance;
+    const double z = std::abs(a.row.r) / std::sqrt(a.variance + a.plane_variance);
+    const double weight = a.weight = (z > robust_sigmas ? robust_sigmas / z : 1.0) / variance;
     info.A.selfadjointView<Eigen::Lower>().rankUpdate(a.row.J, weight);
     info.b += weight * a.row.r * a.row.J;
     info.chi2 += weight * a.row.r * a.row.r;
@@ -115,9 +132,9 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   }
   report_.matched = info.rows;
   report_.chi2_per_row = info.rows > 0 ? info.chi2 / info.rows : 0;
-  if (first_) report_.degeneracy = find_degeneracy(info.A, fake, config_.weak_direction);
+  if (first_) report_.degeneracy = find_degeneracy(info.A, fake, config_.weak_share);
   first_ = false;
-  project_out(report_.degeneracy, info);
+  project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), info);
   return info;
 }
 
@@ -129,11 +146,16 @@ std::vector<EpochInformation> LidarModel::by_epoch() const {
     if (it == out.end()) it = out.insert(out.end(), EpochInformation{a.epoch});
     it->A.selfadjointView<Eigen::Lower>().rankUpdate(a.row.J, a.weight);
   }
-  for (EpochInformation& e : out) e.A.triangularView<Eigen::StrictlyUpper>() = e.A.transpose();
+  const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
+  for (EpochInformation& e : out) {
+    e.A.triangularView<Eigen::StrictlyUpper>() = e.A.transpose();
+    e.A = (known.transpose() * e.A * known).eval();
+  }
   return out;
 }
 
-std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL, const LidarConfig& config) {
+std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL,
+                                 const LidarConfig& config) {
   std::vector<PointGroup> groups;
   groups.reserve(clusters.size());
   const Eigen::Matrix3d& R = T_WI.R.matrix();

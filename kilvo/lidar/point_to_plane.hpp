@@ -14,16 +14,16 @@ namespace kilvo {
 
 /// One row: r = n'(R p + t - q), J = dr/d(theta, t) = [(p x R'n)', n'].
 struct PointToPlaneRow {
-  double r = 0;                                                            // m
-  Eigen::Matrix<double, 6, 1> J = Eigen::Matrix<double, 6, 1>::Zero();     // over (rotation, position)
+  double r = 0;                                                         // m
+  Eigen::Matrix<double, 6, 1> J = Eigen::Matrix<double, 6, 1>::Zero();  // over (rotation, position)
 };
 PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, const Eigen::Vector3d& n_W, const Eigen::Vector3d& q_W);
 
 /// What the last evaluation used.
 struct RegistrationReport {
-  int clusters = 0;          // of the sweep
-  int matched = 0;           // rows used
-  int rejected = 0;          // had a plane but failed the gate
+  int clusters = 0;  // of the sweep
+  int matched = 0;   // rows used
+  int rejected = 0;  // had a plane but failed the gate
   double chi2_per_row = 0;
   Degeneracy degeneracy;
 };
@@ -46,7 +46,7 @@ class LidarModel {
 
   const RegistrationReport& report() const { return report_; }
 
-  /// The information of the last evaluation, by epoch of the map.
+  /// The information of the last evaluation, by epoch of the map, without the weak directions.
   std::vector<EpochInformation> by_epoch() const;
 
  private:
@@ -54,9 +54,9 @@ class LidarModel {
     const Plane* plane = nullptr;
     std::uint32_t node = 0;
     std::uint32_t epoch = 0;
-    double weight = 0;           // 1/m^2, of the last evaluation
-    double variance = 0;         // of the cluster's mean along the normal: measurement and roughness, m^2
-    double plane_variance = 0;   // of the plane under it, common to all clusters of the plane, m^2
+    double weight = 0;          // 1/m^2, of the last evaluation
+    double variance = 0;        // of the cluster's mean along the normal: measurement and roughness, m^2
+    double plane_variance = 0;  // of the plane under it, common to all clusters of the plane, m^2
     PointToPlaneRow row;
   };
 
@@ -75,6 +75,7 @@ class LidarModel {
 };
 
 /// The clusters as groups of points in the world, for VoxelMap::insert.
-std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL, const LidarConfig& config);
+std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL,
+                                 const LidarConfig& config);
 
 }  // namespace kilvo
