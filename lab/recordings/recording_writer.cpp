@@ -4,8 +4,9 @@
 
 namespace kilvo::lab {
 
-RecordingWriter::RecordingWriter(const std::filesystem::path& path, Topics topics, Rosbag1Writer::Compression compression)
-    : bag_(path, compression), topics_(std::move(topics)) {}
+RecordingWriter::RecordingWriter(const std::filesystem::path& path, Topics topics, Rosbag1Writer::Compression compression,
+                                 std::size_t chunk_bytes)
+    : bag_(path, compression, chunk_bytes), topics_(std::move(topics)) {}
 
 void RecordingWriter::write(const Measurement& measurement, std::optional<Time> recorded) {
   const Sensor sensor = sensor_of(measurement);

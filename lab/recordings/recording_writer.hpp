@@ -17,7 +17,7 @@ class RecordingWriter {
 
   /// Throws OutputError, as do all functions.
   RecordingWriter(const std::filesystem::path& path, Topics topics,
-                  Rosbag1Writer::Compression compression = Rosbag1Writer::Compression::none);
+                  Rosbag1Writer::Compression compression = Rosbag1Writer::Compression::none, std::size_t chunk_bytes = default_chunk_bytes);
 
   /// `recorded`: when the measurement arrived; by default at its own stamp.
   void write(const Measurement& measurement, std::optional<Time> recorded = std::nullopt);

@@ -27,7 +27,8 @@ BagChunkReader::BagChunkReader(const FileBytes& file, const BagChunk& chunk)
   auto inflated = inflate_chunk(chunk.compression, compressed, chunk.inflated_size);
   inflated_ = std::move(inflated.bytes);
   size_ = inflated_.size();
-  if (!inflated.fault.empty()) note(0, "the chunk " + inflated.fault);
+  // That a shortened chunk lacks its end is known; and its good beginning is no damage.
+  if (!inflated.fault.empty() && !(chunk.shortened && size_ > 0)) note(0, "the chunk " + inflated.fault);
 }
 
 Bytes BagChunkReader::view(std::uint64_t offset, std::uint64_t count) {
@@ -52,7 +53,8 @@ std::optional<BagEntry> BagChunkReader::scan(const std::function<void(BagConnect
     const std::uint32_t data_size = reader.read<std::uint32_t>();
     const std::uint64_t data = begin + header_size + 8;
     if (!reader.ok() || !header || data_size > size_ - data) {
-      note(begin, "a damaged record in a chunk");
+      if (!chunk_.shortened) note(begin, "a damaged record in a chunk");
+      position_ = size_;
       return std::nullopt;
     }
     position_ = data + data_size;

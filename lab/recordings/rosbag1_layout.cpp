@@ -57,41 +57,53 @@ class Walk {
     if (record.header.op == BagOp::chunk && is_chunk_header(record.header)) {
       begin_chunk(record, at);
       if (whole) return record.data_offset + record.data_size;
+      layout_.chunks.back().shortened = true;
       return lost(at, "the chunk is longer than the file");
     }
     if (!whole) return lost(at, "the record is longer than the file");
+    bool sound = false;
     switch (record.header.op.value()) {
       case BagOp::index:
-        if (!add_index(record)) return lost(at, "the index record is damaged");
+        sound = add_index(record);
         break;
       case BagOp::bag_header:
-        read_bag_header(record.header);
+        sound = read_bag_header(record.header);
         break;
       case BagOp::connection:
-        add_connection(record);
+        sound = add_connection(record);
         break;
       case BagOp::chunk_info:
-        ++chunk_infos_;
+        sound = add_chunk_info(record);
         break;
       default:
-        return lost(at, "a record of unknown kind");
+        break;
     }
+    if (!sound) return lost(at, "a damaged record, or one of unknown kind");
     if (record.header.op != BagOp::index) finish_chunk();
     return record.data_offset + record.data_size;
   }
 
   /// Notes damage at `at` and looks for the next chunk. When a chunk's length is false, that chunk may lie within its claimed data.
   std::optional<std::uint64_t> lost(std::uint64_t at, const std::string& reason) {
-    if (layout_.damages.size() < most_damages) layout_.damages.push_back({at, reason});
-    const bool after_chunk = !layout_.chunks.empty() && open_;
-    const std::uint64_t from = after_chunk && !saw_index_ ? layout_.chunks.back().data_offset : at + 1;
+    const bool in_chunk = open_ && layout_.chunks.back().offset == at;
+    const bool search_in_chunk = open_ && !saw_index_;
+    const auto next = find_chunk(file_, search_in_chunk ? layout_.chunks.back().data_offset : at + 1);
+    if (in_chunk && !next) {
+      note({file_.size(), "the file ends in the middle of a chunk"});
+    } else {
+      note({at, reason});
+    }
     index_is_whole_ = false;
-    const auto next = find_chunk(file_, from);
-    if (after_chunk) {
+    if (search_in_chunk && next) {
       BagChunk& chunk = layout_.chunks.back();
-      chunk.data_size = std::min(chunk.data_size, next.value_or(file_.size()) - chunk.data_offset);
+      chunk.shortened |= *next - chunk.data_offset < chunk.data_size;
+      chunk.data_size = std::min(chunk.data_size, *next - chunk.data_offset);
     }
     return next;
+  }
+
+  void note(Damage damage) {
+    if (layout_.damages.size() < most_damages) layout_.damages.push_back(std::move(damage));
   }
 
   void begin_chunk(const Record& record, std::uint64_t at) {
@@ -149,20 +161,28 @@ class Walk {
     return true;
   }
 
-  void read_bag_header(const BagRecordHeader& header) {
+  bool read_bag_header(const BagRecordHeader& header) {
+    if (!header.index_pos) return false;
     if (!header.encryptor.empty()) throw InputError(file_.name() + ": the bag is encrypted (" + std::string(header.encryptor) + ")");
     has_header_ = true;
-    index_pos_ = header.index_pos.value_or(0);
+    index_pos_ = *header.index_pos;
     chunk_count_ = header.chunk_count.value_or(0);
+    return true;
   }
 
-  void add_connection(const Record& record) {
-    if (record.data_size > most_connection_bytes) return;
+  bool add_chunk_info(const Record& record) {
+    ++chunk_infos_;
+    return record.header.count && record.data_size == std::uint64_t{*record.header.count} * 8;
+  }
+
+  bool add_connection(const Record& record) {
+    if (record.data_size > most_connection_bytes) return false;
     const std::string topic(record.header.topic);  // the window is about to move
     BagRecordHeader header = record.header;
     header.topic = topic;
-    const auto connection = parse_connection(header, window_.view(record.data_offset, static_cast<std::size_t>(record.data_size)));
-    if (connection) layout_.footer.emplace(connection->id, *connection);
+    auto connection = parse_connection(header, window_.view(record.data_offset, static_cast<std::size_t>(record.data_size)));
+    if (connection) layout_.footer.emplace(connection->id, *std::move(connection));
+    return connection.has_value();
   }
 
   /// A file that was cut between two records looks sound until here.

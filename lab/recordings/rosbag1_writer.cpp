@@ -144,6 +144,12 @@ void Rosbag1Writer::write_chunk() {
   index_.clear();
 }
 
+void Rosbag1Writer::flush() {
+  write_chunk();
+  file_.flush();
+  if (!file_) throw OutputError(name_ + ": cannot be written (disk full?)");
+}
+
 void Rosbag1Writer::close() {
   if (closed_) return;
   closed_ = true;

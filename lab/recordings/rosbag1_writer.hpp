@@ -19,13 +19,16 @@ struct OutputError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// As rosbag has it.
+inline constexpr std::size_t default_chunk_bytes = 768 << 10;
+
 class Rosbag1Writer {
  public:
   enum class Compression : std::uint8_t { none, lz4 };
 
   /// A chunk is written when it holds `chunk_bytes`. Throws OutputError.
   explicit Rosbag1Writer(const std::filesystem::path& path, Compression compression = Compression::none,
-                         std::size_t chunk_bytes = 768 << 10);
+                         std::size_t chunk_bytes = default_chunk_bytes);
   /// Closes; a failure to do so is not told: call close() to hear of it.
   ~Rosbag1Writer();
   Rosbag1Writer(const Rosbag1Writer&) = delete;
@@ -36,6 +39,9 @@ class Rosbag1Writer {
 
   /// `recorded`: when the message arrived; best given in ascending order. Throws OutputError when the disk is full.
   void write(std::uint32_t connection, Time recorded, Bytes message);
+
+  /// Ends the chunk in the making: what was written so far can be read, even if the bag is never closed.
+  void flush();
 
   /// Writes the last chunk and the index. Throws OutputError.
   void close();
