@@ -13,6 +13,9 @@ constexpr std::size_t point_bytes = 19;
 // Clocks that are one clock do not differ by more: the driver sets stamp and timebase from the same packet.
 constexpr std::int64_t same_clock_ns = 1'000'000'000;
 
+// The year 2116. A timebase beyond it is no time, and adding to it might overflow.
+constexpr std::uint64_t latest_timebase = std::uint64_t{1} << 62;
+
 struct Cloud {
   Time t{};
   std::int64_t first_offset_ns = 0;  // timebase minus t
@@ -23,7 +26,8 @@ Decoded<Cloud> read_cloud(Bytes message) {
   ByteReader reader(message);
   Cloud cloud;
   cloud.t = read_ros_header(reader).stamp;
-  const auto timebase = static_cast<std::int64_t>(reader.read<std::uint64_t>());
+  const auto raw_timebase = reader.read<std::uint64_t>();
+  const std::int64_t timebase = raw_timebase < latest_timebase ? static_cast<std::int64_t>(raw_timebase) : 0;
   reader.skip(8);  // point_num, which the array says again; lidar_id, rsvd
   cloud.points = reader.array(point_bytes);
   const std::size_t count = cloud.points.size() / point_bytes;

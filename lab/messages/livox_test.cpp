@@ -47,6 +47,14 @@ TEST(DecodeLivox, WithoutAStampTimebaseIsTheTime) {
   EXPECT_EQ(decoded->scan.points[0].offset_ns, 5);
 }
 
+TEST(DecodeLivox, ATimebaseThatIsNoTimeIsNotUsed) {
+  // Found by fuzzing: as a signed number this is so far in the past that a second before it does not exist.
+  const auto decoded = decode_livox(tiny_livox(Time{}, 0x8000000000040001, {{5}}), timed);
+  ASSERT_TRUE(decoded);
+  EXPECT_EQ(decoded->scan.t, Time{});
+  EXPECT_EQ(decoded->scan.points[0].offset_ns, 5);
+}
+
 TEST(DecodeLivox, PointsWithAbsurdTimesAreDroppedAndCounted) {
   const auto bytes = tiny_livox(stamp, stamp_ns, {{1}, {2'000'000'001}, {4'000'000'000}, {2}});
   const auto decoded = decode_livox(bytes, timed);
