@@ -8,11 +8,13 @@
 namespace kilvo::lab {
 namespace {
 
-// Beyond this the output grows as data really come out: a false claim costs little.
-constexpr std::size_t first_step = std::size_t{8} << 20;
+// The first guess is a usual ratio; beyond it the output grows as data really come out, so that a false claim costs little.
+constexpr std::size_t usual_ratio = 8;
 
 /// Makes room for more output, up to `size` bytes and one more, by which too much is noticed.
-void grow(std::vector<std::uint8_t>& bytes, std::size_t size) { bytes.resize(std::min(size + 1, std::max(first_step, 2 * bytes.size()))); }
+void grow(std::vector<std::uint8_t>& bytes, Bytes compressed, std::size_t size) {
+  bytes.resize(std::min(size + 1, std::max(usual_ratio * compressed.size(), 2 * bytes.size())));
+}
 
 Inflated failed(std::string fault) { return {{}, std::move(fault)}; }
 
@@ -30,7 +32,7 @@ Inflated inflate_lz4(Bytes compressed, std::size_t size) {
   std::vector<std::uint8_t> bytes;
   std::size_t in = 0, out = 0;
   while (true) {
-    if (out == bytes.size()) grow(bytes, size);
+    if (out == bytes.size()) grow(bytes, compressed, size);
     std::size_t given = bytes.size() - out, taken = compressed.size() - in;
     const std::size_t hint = LZ4F_decompress(context.get(), bytes.data() + out, &given, compressed.data() + in, &taken, nullptr);
     if (LZ4F_isError(hint) != 0) return failed(std::string("lz4: ") + LZ4F_getErrorName(hint));
@@ -51,7 +53,7 @@ Inflated inflate_bz2(Bytes compressed, std::size_t size) {
   std::vector<std::uint8_t> bytes;
   std::size_t out = 0;
   while (true) {
-    if (out == bytes.size()) grow(bytes, size);
+    if (out == bytes.size()) grow(bytes, compressed, size);
     stream.next_out = reinterpret_cast<char*>(bytes.data() + out);
     stream.avail_out = static_cast<unsigned>(bytes.size() - out);
     const unsigned room = stream.avail_out, input = stream.avail_in;

@@ -36,7 +36,8 @@ std::optional<std::uint64_t> find_chunk(const FileBytes& file, std::uint64_t fro
   // Blocks overlap by two headers, so that a header on their border is whole in one of them.
   constexpr std::size_t overlap = 2 * longest_chunk_header;
   const std::boyer_moore_horspool_searcher searcher(op_field.begin(), op_field.end());
-  std::vector<std::uint8_t> block(block_bytes);
+  if (from >= file.size()) return std::nullopt;
+  std::vector<std::uint8_t> block(static_cast<std::size_t>(std::min<std::uint64_t>(block_bytes, file.size() - from)));
   for (std::uint64_t at = from; at < file.size(); at += block_bytes - overlap) {
     const Bytes bytes = Bytes(block).first(file.read_at(at, block));
     auto op = bytes.begin();

@@ -1,0 +1,16 @@
+// Any bytes as a bag: the index, every message in order, and each of them decoded as what its topic says it is.
+#include "lab/messages/input_error.hpp"
+#include "lab/messages/message_decoder.hpp"
+#include "lab/recordings/rosbag1_reader.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace kilvo::lab;
+  try {
+    Rosbag1Reader reader(FileBytes(std::vector<std::uint8_t>(data, data + size)));
+    const PointTimeFormat time{"timestamp", "float64", TimeUnit::nanoseconds, TimeReference::absolute, true};
+    while (const auto message = reader.next()) (void)decode_measurement(message->connection->type, message->bytes, time);
+  } catch (const InputError&) {
+    // Not a bag.
+  }
+  return 0;
+}
