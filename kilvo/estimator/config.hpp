@@ -36,6 +36,7 @@ struct EstimatorConfig {
   double max_wait = 0.2;      // s
   double max_imu_gap = 0.1;   // s
   bool gravity_align = true;
+  int threads = 1;
 
   InitialConfig initial;
   ProcessNoise noise;
@@ -46,7 +47,8 @@ struct EstimatorConfig {
   static constexpr auto fields() {
     return std::tuple{Field{"max_wait", &EstimatorConfig::max_wait, "s", "how long, in data time, a measurement waits for others of earlier stamps"},
                       Field{"max_imu_gap", &EstimatorConfig::max_imu_gap, "s", "a longer gap between IMU samples is bridged with wide uncertainties"},
-                      Field{"gravity_align", &EstimatorConfig::gravity_align, "-", "z of the world is up; false: the world is the first IMU frame"}};
+                      Field{"gravity_align", &EstimatorConfig::gravity_align, "-", "z of the world is up; false: the world is the first IMU frame"},
+                      Field{"threads", &EstimatorConfig::threads, "-", "threads for sums over many points, 0: all cores; results do not depend on it"}};
   }
 };
 

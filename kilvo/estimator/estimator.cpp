@@ -52,7 +52,8 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       timeline_(used, from_seconds(config.max_wait)),
       initialiser_(config.initial, config.gravity_align),
       trajectory_(trajectory_length),
-      map_(config.map) {
+      map_(config.map),
+      workers_(config.threads) {
   if (!used[static_cast<std::size_t>(Sensor::imu)]) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.leaf_size() * (1 + 1e-9)) throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
 }
@@ -236,7 +237,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   // With hysteresis: each change of mind would hand what was drifted since to the map.
   constexpr double to_leave = 3.0;
   if (degenerate_) lidar.weak_share *= to_leave;
-  LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar);
+  LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar, workers_);
   estimate_ = map_.empty() ? prior : update(prior, model, config_.update).posterior;
   const bool good = keep_finite();
   StageTimes stages;

@@ -67,6 +67,7 @@ class Estimator {
   std::deque<PendingScan> pending_;
   Trajectory trajectory_;
   VoxelMap map_;
+  Workers workers_;
   MapError map_error_;
   bool degenerate_ = false;  // the last sweep had a weak direction
   Statistics statistics_;

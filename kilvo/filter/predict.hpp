@@ -28,7 +28,8 @@ struct ImuInterval {
 /// any rate.
 struct ProcessNoise {
   double gyro = 4e-4;        // rad/s/sqrt(Hz)
-  double accel = 0.013;      // m/s^2/sqrt(Hz)
+  double accel = 0.003;      // m/s^2/sqrt(Hz)
+  double velocity = 8e-4;    // m/s/sqrt(Hz)
   double gyro_bias = 2e-5;   // rad/s/sqrt(s)
   double accel_bias = 3e-4;  // m/s^2/sqrt(s)
   double foot = 0.01;        // m/sqrt(s), of a standing foot, each axis of the foot frame
@@ -37,6 +38,7 @@ struct ProcessNoise {
   static constexpr auto fields() {
     return std::tuple{Field{"gyro_noise", &ProcessNoise::gyro, "rad/s/sqrt(Hz)", "noise density of the gyro, aliased impacts included"},
                       Field{"accel_noise", &ProcessNoise::accel, "m/s^2/sqrt(Hz)", "noise density of the accelerometer, aliased impacts included"},
+                      Field{"velocity_noise", &ProcessNoise::velocity, "m/s/sqrt(Hz)", "noise density of the integrated acceleration that does not accumulate: aliased impacts that the next samples take back"},
                       Field{"gyro_bias_walk", &ProcessNoise::gyro_bias, "rad/s/sqrt(s)", "random walk of the gyro bias"},
                       Field{"accel_bias_walk", &ProcessNoise::accel_bias, "m/s^2/sqrt(s)", "random walk of the accelerometer bias"},
                       Field{"foot_noise", &ProcessNoise::foot, "m/sqrt(s)", "random walk of a standing foot"},

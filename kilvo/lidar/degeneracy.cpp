@@ -12,7 +12,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 // How far, in radians, the planes of the map may be wrong about a direction that they do not hold.
-constexpr double direction_error = 5e-3;
+constexpr double direction_error = 1e-2;
 
 // Scales rotation to metres at the lever of the points: d_scaled = (lever * theta, p).
 Matrix6 scaled(const Matrix6& A, double lever) {

@@ -28,13 +28,14 @@ PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, cons
   return row;
 }
 
-LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL,
-                       const PoseCovariance& map_error, const LidarConfig& config)
+LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const PoseCovariance& map_error,
+                       const LidarConfig& config, const Workers& workers)
     : map_(map),
       clusters_(clusters),
       p_IL_(p_IL),
       map_error_(map_error),
       config_(config),
+      workers_(workers),
       associations_(clusters.size()),
       rows_of_node_(map.node_capacity(), 0) {}
 
@@ -60,7 +61,7 @@ bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluste
   return true;
 }
 
-LidarModel::Association LidarModel::associate(const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P) {
+LidarModel::Association LidarModel::associate(const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P, int& rejected) const {
   Association found;
   bool seen = false;
   const auto try_at = [&](const Eigen::Vector3d& x) {
@@ -73,7 +74,7 @@ LidarModel::Association LidarModel::associate(const PointCluster& cluster, const
   if (try_at(x)) return found;
   if (seen) {
     // Its own voxels hold a surface, and it is another one: no business of the neighbours.
-    ++report_.rejected;
+    ++rejected;
     return found;
   }
   // Nothing known here yet: the nearest neighbour leaf, across the face that the point is closest to.
@@ -85,54 +86,80 @@ LidarModel::Association LidarModel::associate(const PointCluster& cluster, const
   Eigen::Vector3d beside = x;
   beside[axis] += offset[axis] > 0 ? leaf : -leaf;
   try_at(beside);
-  report_.rejected += seen && found.plane == nullptr ? 1 : 0;
+  rejected += seen && found.plane == nullptr ? 1 : 0;
   return found;
+}
+
+struct LidarModel::Sums {
+  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();     // lower triangles
+  Eigen::Matrix<double, 6, 6> fake = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
+  double chi2 = 0;
+  int rows = 0;
+
+  Sums& operator+=(const Sums& o) {
+    A += o.A;
+    fake += o.fake;
+    b += o.b;
+    chi2 += o.chi2;
+    rows += o.rows;
+    return *this;
+  }
+};
+
+void LidarModel::add_row(std::size_t i, const SE3& T_WI, Sums& sums) {
+  Association& a = associations_[i];
+  if (a.plane == nullptr) return;
+  // k rows of one plane share its error: each carries k times its variance, so that together they average it not at all.
+  const double variance = a.variance + rows_of_node_[a.node] * a.plane_variance;
+  const double z = std::abs(a.row.r) / std::sqrt(a.variance + a.plane_variance);
+  a.weight = (z > robust_sigmas ? robust_sigmas / z : 1.0) / variance;
+  sums.A.selfadjointView<Eigen::Lower>().rankUpdate(a.row.J, a.weight);
+  sums.b += a.weight * a.row.r * a.row.J;
+  sums.chi2 += a.weight * a.row.r * a.row.r;
+  ++sums.rows;
+  if (!first_) return;
+  const Eigen::Vector3d p_I = clusters_[i].mean.cast<double>();
+  const Eigen::Vector3f other_axis = a.plane->normal.cross(a.plane->axis);
+  for (const auto& [axis, tilt] : {std::pair(a.plane->axis, a.plane->tilt_variance_1), std::pair(other_axis, a.plane->tilt_variance_2)}) {
+    Eigen::Matrix<double, 6, 1> g;
+    g.tail<3>() = axis.cast<double>();
+    g.head<3>() = p_I.cross(T_WI.R.matrix().transpose() * g.tail<3>());
+    sums.fake.selfadjointView<Eigen::Lower>().rankUpdate(g, a.weight * static_cast<double>(tilt));
+  }
 }
 
 Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   const SE3 T_WI = x.pose();
   const PoseCovariance P = prior.topLeftCorner<6, 6>() + map_error_;
+  constexpr std::size_t block = 256;
   report_.clusters = static_cast<int>(clusters_.size());
-  report_.matched = report_.rejected = 0;
-  for (std::size_t i = 0; i < clusters_.size(); ++i) {
-    Association& a = associations_[i];
-    a = associate(clusters_[i], T_WI, P);
+  report_.rejected = workers_.sum(clusters_.size(), block, 0, [&](std::size_t first, std::size_t last) {
+    int rejected = 0;
+    for (std::size_t i = first; i < last; ++i) associations_[i] = associate(clusters_[i], T_WI, P, rejected);
+    return rejected;
+  });
+  for (const Association& a : associations_) {
     if (a.plane != nullptr) ++rows_of_node_[a.node];
+  }
+  Sums sums = workers_.sum(associations_.size(), block, Sums{}, [&](std::size_t first, std::size_t last) {
+    Sums part;
+    for (std::size_t i = first; i < last; ++i) add_row(i, T_WI, part);
+    return part;
+  });
+  for (const Association& a : associations_) {
+    if (a.plane != nullptr) rows_of_node_[a.node] = 0;
   }
 
   Information<6> info;
   info.columns = {at::R, at::R + 1, at::R + 2, at::p, at::p + 1, at::p + 2};
-  Eigen::Matrix<double, 6, 6> fake = Eigen::Matrix<double, 6, 6>::Zero();
-  for (std::size_t i = 0; i < associations_.size(); ++i) {
-    Association& a = associations_[i];
-    if (a.plane == nullptr) continue;
-    // k rows of one plane share its error: each carries k times its variance, so that together they average it not at all.
-    const double variance = a.variance + rows_of_node_[a.node] * a.plane_variance;
-    const double z = std::abs(a.row.r) / std::sqrt(a.variance + a.plane_variance);
-    const double weight = a.weight = (z > robust_sigmas ? robust_sigmas / z : 1.0) / variance;
-    info.A.selfadjointView<Eigen::Lower>().rankUpdate(a.row.J, weight);
-    info.b += weight * a.row.r * a.row.J;
-    info.chi2 += weight * a.row.r * a.row.r;
-    ++info.rows;
-    if (first_) {
-      const Eigen::Vector3d p_I = clusters_[i].mean.cast<double>();
-      const Eigen::Vector3f u = a.plane->axis, w = a.plane->normal.cross(a.plane->axis);
-      for (const auto& [axis, variance] : {std::pair(u, a.plane->tilt_variance_1), std::pair(w, a.plane->tilt_variance_2)}) {
-        Eigen::Matrix<double, 6, 1> g;
-        g.tail<3>() = axis.cast<double>();
-        g.head<3>() = p_I.cross(T_WI.R.matrix().transpose() * g.tail<3>());
-        fake.selfadjointView<Eigen::Lower>().rankUpdate(g, weight * static_cast<double>(variance));
-      }
-    }
-  }
-  info.A.triangularView<Eigen::StrictlyUpper>() = info.A.transpose();
-  fake.triangularView<Eigen::StrictlyUpper>() = fake.transpose();
-  for (const Association& a : associations_) {
-    if (a.plane != nullptr) rows_of_node_[a.node] = 0;
-  }
+  info.A = sums.A.selfadjointView<Eigen::Lower>();
+  info.b = sums.b;
+  info.chi2 = sums.chi2;
+  info.rows = sums.rows;
   report_.matched = info.rows;
   report_.chi2_per_row = info.rows > 0 ? info.chi2 / info.rows : 0;
-  if (first_) report_.degeneracy = find_degeneracy(info.A, fake, config_.weak_share);
+  if (first_) report_.degeneracy = find_degeneracy(info.A, sums.fake.selfadjointView<Eigen::Lower>(), config_.weak_share);
   first_ = false;
   project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), info);
   return info;

@@ -9,6 +9,7 @@
 #include "kilvo/lidar/downsample.hpp"
 #include "kilvo/lidar/lidar_config.hpp"
 #include "kilvo/map/voxel_map.hpp"
+#include "kilvo/math/deterministic_sum.hpp"
 
 namespace kilvo {
 
@@ -37,10 +38,10 @@ struct EpochInformation {
 /// The model that `update` calls: at each iterate it looks the planes up anew, gates, and sums the rows.
 class LidarModel {
  public:
-  /// Keeps references: the map and the clusters must outlive it. `map_error`: covariance of the pose from the map's own error, by which
+  /// Keeps references: the map, the clusters and the workers must outlive it. `map_error`: covariance of the pose from the map's own error, by which
   /// the gate is wider than the filter's covariance says.
   LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const PoseCovariance& map_error,
-             const LidarConfig& config);
+             const LidarConfig& config, const Workers& workers);
 
   Information<6> operator()(const State& x, const Covariance& prior);
 
@@ -60,14 +61,17 @@ class LidarModel {
     PointToPlaneRow row;
   };
 
-  Association associate(const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P);
+  struct Sums;
+  Association associate(const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P, int& rejected) const;
   bool accept(const VoxelMap::Match& match, const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P, Association& out) const;
+  void add_row(std::size_t i, const SE3& T_WI, Sums& sums);
 
   const VoxelMap& map_;
   std::span<const PointCluster> clusters_;
   Eigen::Vector3d p_IL_;
   PoseCovariance map_error_;
   LidarConfig config_;
+  const Workers& workers_;
   std::vector<Association> associations_;
   std::vector<std::uint16_t> rows_of_node_;
   bool first_ = true;
