@@ -75,6 +75,7 @@ std::vector<TopicDescription> list_topics(const Rosbag1Reader& reader) {
     if (times != reader.times().end()) add(topic, times->second);
   }
   std::vector<TopicDescription> list;
+  list.reserve(topics.size());
   for (auto& [name, topic] : topics) list.push_back(std::move(topic));
   return list;
 }

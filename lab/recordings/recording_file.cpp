@@ -8,7 +8,7 @@ namespace kilvo::lab {
 namespace {
 
 std::filesystem::path bag_in(const std::filesystem::path& folder) {
-  const auto bag = folder / "recording.bag";
+  auto bag = folder / "recording.bag";
   std::error_code error;
   if (std::filesystem::exists(bag, error)) return bag;
   if (std::filesystem::exists(folder / "metadata.yaml", error)) {

@@ -15,8 +15,8 @@ constexpr double for_ever = 1e9;
 
 Time after(Time begin, double seconds) { return seconds < for_ever ? begin + from_seconds(std::max(seconds, 0.0)) : Time::max(); }
 
-void shift(Measurement& measurement, Duration offset) {
-  std::visit([&](auto& m) { m.t += offset; }, measurement);
+Time& stamp_in(Measurement& measurement) {
+  return std::visit([](auto& m) -> Time& { return m.t; }, measurement);
 }
 
 std::string plural(std::uint64_t count, const std::string& what) { return std::to_string(count) + " " + what + (count == 1 ? "" : "s"); }
@@ -89,7 +89,13 @@ std::optional<Measurement> RecordingSource::decode(Sensor sensor, const RawMessa
   }
   ++counts.used;
   counts.absurd_point_times += decoded->absurd_times;
-  shift(decoded->measurement, from_seconds(options_[sensor].time_offset));
+  Time& stamp = stamp_in(decoded->measurement);
+  if (stamp == Time{}) {
+    // A driver that does not stamp, as some do not their joints: the time of arrival is the best there is.
+    stamp = message.time;
+    ++counts.unstamped;
+  }
+  stamp += from_seconds(options_[sensor].time_offset);
   return std::move(decoded->measurement);
 }
 
@@ -122,6 +128,9 @@ std::vector<std::string> RecordingSource::warnings() const {
     if (counts.dropped.contains("too_large")) {
       texts.push_back(topic + ": " + plural(counts.dropped.at("too_large"), "message") + " of more than " +
                       std::to_string(most_message_bytes >> 20) + " MB not read");
+    }
+    if (counts.unstamped > 0) {
+      texts.push_back(topic + ": " + plural(counts.unstamped, "message") + " without a stamp: the time of recording is used");
     }
     if (counts.absurd_point_times > 0) {
       texts.push_back(topic + ": " + plural(counts.absurd_point_times, "point") + " dropped, whose time is not within 2 s of the stamp");

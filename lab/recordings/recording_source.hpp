@@ -47,6 +47,7 @@ struct SensorCounts {
   std::uint64_t used = 0;
   std::map<std::string, std::uint64_t> dropped;  // cause -> messages: "drop_option", "undecodable", "too_large"
   std::uint64_t absurd_point_times = 0;          // points, not messages: dropped from their clouds
+  std::uint64_t unstamped = 0;                   // used, with the time of their recording because their stamp is 0
 };
 
 class RecordingSource final : public MeasurementSource {

@@ -221,12 +221,28 @@ TEST(RecordingSource, ATopicWithoutMessagesIsWarnedOf) {
     Rosbag1Writer writer(folder / "empty.bag");
     const auto imu = writer.add_connection("/imu", written_type(Sensor::imu));
     writer.add_connection("/points", written_type(Sensor::lidar));
-    writer.write(imu, tiny_begin, encode(ImuSample{}, ""));
+    writer.write(imu, tiny_begin, encode(ImuSample{tiny_begin, {}, {}}, ""));
     writer.close();
   }
   RecordingSource source(folder / "empty.bag", use({Sensor::imu, Sensor::lidar}));
   drain(source);
   EXPECT_THAT(source.warnings(), ::testing::ElementsAre("/points: no messages"));
+}
+
+TEST(RecordingSource, MessagesWithoutAStampGetTheTimeOfTheirRecording) {
+  const TemporaryFolder folder;
+  {
+    Rosbag1Writer writer(folder / "unstamped.bag");
+    const auto id = writer.add_connection("/joints", written_type(Sensor::legs));
+    for (int i = 0; i < 3; ++i)
+      writer.write(id, tiny_begin + std::chrono::milliseconds(i), encode(JointSample{Time{}, {"knee"}, {1}, {}, {}}, ""));
+    writer.close();
+  }
+  RecordingSource source(folder / "unstamped.bag", use({Sensor::legs}));
+  const auto read = drain(source);
+  ASSERT_EQ(read.size(), 3U);
+  EXPECT_EQ(stamp_of(read[2]), tiny_begin + std::chrono::milliseconds(2));
+  EXPECT_THAT(source.warnings(), ::testing::ElementsAre("/joints: 3 messages without a stamp: the time of recording is used"));
 }
 
 TEST(RecordingSource, TwoReadingsGiveTheSameBytes) {

@@ -15,7 +15,10 @@ bool is_compressed(const BagChunk& chunk) { return chunk.compression != "none"; 
 }  // namespace
 
 BagChunkReader::BagChunkReader(const FileBytes& file, const BagChunk& chunk)
-    : file_(&file), chunk_(chunk), size_(chunk.data_size), window_(file, is_compressed(chunk) ? 0 : window_bytes) {
+    : file_(&file),
+      chunk_(chunk),
+      size_(chunk.data_size),
+      window_(file, is_compressed(chunk) ? 0 : std::min<std::uint64_t>(window_bytes, chunk.data_size)) {
   if (!is_compressed(chunk)) return;
   if (chunk.data_size > most_chunk_bytes) {
     size_ = 0;
@@ -43,14 +46,14 @@ void BagChunkReader::note(std::uint64_t offset, const std::string& reason) {
   position_ = size_;
 }
 
-std::optional<BagEntry> BagChunkReader::scan(const std::function<void(BagConnection)>& on_connection) {
+std::optional<BagEntry> BagChunkReader::scan(const std::function<void(const BagConnection&)>& on_connection) {
   while (position_ < size_) {
     const std::uint64_t begin = position_;
     const std::size_t header_size = ByteReader(view(begin, 4)).read<std::uint32_t>();
     ByteReader reader(header_size <= most_header_bytes ? view(begin, header_size + 8) : Bytes{});
     reader.skip(4);
     const auto header = parse_bag_header(reader.take(header_size));
-    const std::uint32_t data_size = reader.read<std::uint32_t>();
+    const auto data_size = reader.read<std::uint32_t>();
     const std::uint64_t data = begin + header_size + 8;
     if (!reader.ok() || !header || data_size > size_ - data) {
       if (!chunk_.shortened) note(begin, "a damaged record in a chunk");
@@ -71,7 +74,7 @@ std::optional<BagEntry> BagChunkReader::scan(const std::function<void(BagConnect
       const auto again = parse_bag_header(whole.take(header_size));
       whole.skip(4);
       const Bytes text = whole.take(data_size);
-      if (auto connection = again && whole.ok() ? parse_connection(*again, text) : std::nullopt) on_connection(*std::move(connection));
+      if (const auto connection = again && whole.ok() ? parse_connection(*again, text) : std::nullopt) on_connection(*connection);
     }
   }
   return std::nullopt;

@@ -24,7 +24,7 @@ class BagChunkReader {
 
   /// The next message in the order of the file, or nothing at the end of the chunk or of what can be read of it. Connection records
   /// on the way go to `on_connection`, if there is one.
-  std::optional<BagEntry> scan(const std::function<void(BagConnection)>& on_connection = {});
+  std::optional<BagEntry> scan(const std::function<void(const BagConnection&)>& on_connection = {});
 
   /// The bytes of a message, valid until the next call of any function. Empty when the file can no longer be read.
   Bytes message(const BagEntry& entry);

@@ -142,6 +142,22 @@ TEST(DamagedChunk, DamageInCompressedDataIsReportedAtItsChunk) {
   }
 }
 
+TEST(DamagedChunk, AHeaderAtTheVeryEndIsNotFoundAgainAndAgain) {
+  // Found by fuzzing: a chunk that seems to go on, and behind it the header of another chunk without the length of its data.
+  const TemporaryFolder folder;
+  write_bag(folder / "walk.bag", tiny_walk(20));
+  Content content = file_content(folder / "walk.bag");
+  const auto chunk = read_bag_layout(FileBytes(content)).chunks.at(0);
+  const Content header(content.begin() + static_cast<std::ptrdiff_t>(chunk.offset),
+                       content.begin() + static_cast<std::ptrdiff_t>(chunk.data_offset) - 4);
+  content.resize(chunk.data_offset + chunk.data_size);
+  content.insert(content.end(), {1, 2, 3});
+  content.insert(content.end(), header.begin(), header.end());
+  bool damaged = false;
+  ASSERT_TRUE(read_content(content, &damaged));
+  EXPECT_TRUE(damaged);
+}
+
 TEST(DamagedChunk, AFalseInflatedSizeCostsNoMemory) {
   for (const std::string compression : {"bz2", "lz4"}) {
     const Content content = tiny_bag_content(compression);

@@ -53,6 +53,7 @@ class Walk {
 
   /// The offset to go on from, or nothing at the end of what can be read.
   std::optional<std::uint64_t> take(const Record& record, std::uint64_t at) {
+    resynced_ = false;
     const bool whole = record.data_size <= file_.size() - record.data_offset;
     if (record.header.op == BagOp::chunk && is_chunk_header(record.header)) {
       begin_chunk(record, at);
@@ -86,7 +87,7 @@ class Walk {
   /// Notes damage at `at` and looks for the next chunk. When a chunk's length is false, that chunk may lie within its claimed data.
   std::optional<std::uint64_t> lost(std::uint64_t at, const std::string& reason) {
     const bool in_chunk = open_ && layout_.chunks.back().offset == at;
-    const bool search_in_chunk = open_ && !saw_index_;
+    const bool search_in_chunk = open_ && !saw_index_ && !resynced_;
     const auto next = find_chunk(file_, search_in_chunk ? layout_.chunks.back().data_offset : at + 1);
     if (in_chunk && !next) {
       note({file_.size(), "the file ends in the middle of a chunk"});
@@ -94,6 +95,7 @@ class Walk {
       note({at, reason});
     }
     index_is_whole_ = false;
+    resynced_ = true;
     if (search_in_chunk && next) {
       BagChunk& chunk = layout_.chunks.back();
       chunk.shortened |= *next - chunk.data_offset < chunk.data_size;
@@ -133,6 +135,7 @@ class Walk {
     for (const auto& [connection, times] : index_) {
       chunk.first = std::min(chunk.first, times.first);
       chunk.last = std::max(chunk.last, times.last);
+      if (layout_.times.size() >= most_connections && !layout_.times.contains(connection)) continue;
       TimesSummary& total = layout_.times[connection];
       chunk.new_connections |= total.count == 0;
       total.append(times);
@@ -142,7 +145,7 @@ class Walk {
   bool add_index(const Record& record) {
     saw_index_ = true;
     const auto& header = record.header;
-    if (!open_ || !header.connection || !header.count) return false;
+    if (!open_ || !header.connection || !header.count || index_.size() >= most_connections) return false;
     if (record.data_size != std::uint64_t{*header.count} * index_entry_bytes) return false;
     const std::uint32_t connection = *header.connection;
     std::uint64_t left = record.data_size, at = record.data_offset;
@@ -181,8 +184,9 @@ class Walk {
     BagRecordHeader header = record.header;
     header.topic = topic;
     auto connection = parse_connection(header, window_.view(record.data_offset, static_cast<std::size_t>(record.data_size)));
-    if (connection) layout_.footer.emplace(connection->id, *std::move(connection));
-    return connection.has_value();
+    if (!connection) return false;
+    if (layout_.footer.size() < most_connections) layout_.footer.emplace(connection->id, std::move(*connection));
+    return true;
   }
 
   /// A file that was cut between two records looks sound until here.
@@ -202,6 +206,7 @@ class Walk {
   bool open_ = false;  // the last record was a chunk or one of its index records
   bool saw_index_ = false;
   bool index_is_whole_ = true;
+  bool resynced_ = false;                        // the next record was found by its look, and must not be found again if it proves false
   std::map<std::uint32_t, TimesSummary> index_;  // of the last chunk
   bool has_header_ = false;
   std::uint64_t index_pos_ = 0;

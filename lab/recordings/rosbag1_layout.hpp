@@ -46,7 +46,8 @@ struct BagLayout {
 };
 
 inline constexpr std::size_t most_damages = 100;
-inline constexpr std::size_t most_chunks = 2'000'000;
+inline constexpr std::size_t most_chunks = 1'000'000;  // 0.7 TB of them
+inline constexpr std::size_t most_connections = 10'000;
 
 /// Throws InputError when this is no ROS 1 bag 2.0 at all; anything worse inside is damage, which is skipped to the next chunk.
 BagLayout read_bag_layout(const FileBytes& file);

@@ -106,13 +106,12 @@ TEST_P(RosbagOfPython, WeReadWhatPythonWrites) {
     EXPECT_TRUE(chunk.indexed);
   }
   ASSERT_EQ(pythons.connections().size(), 4U);
-  for (const auto& [id, connection] : pythons.connections()) {
-    const auto same_topic = [&](const auto& other) { return other.second.topic == connection.topic; };
-    const auto other = std::ranges::find_if(ours.connections(), same_topic);
-    ASSERT_NE(other, ours.connections().end());
-    EXPECT_EQ(connection.type, other->second.type);
-    EXPECT_EQ(connection.md5sum, other->second.md5sum);
-  }
+  const auto types = [](const Rosbag1Reader& reader) {
+    std::set<std::tuple<std::string, std::string, std::string>> all;
+    for (const auto& [id, connection] : reader.connections()) all.insert({connection.topic, connection.type, connection.md5sum});
+    return all;
+  };
+  EXPECT_EQ(types(pythons), types(ours));
 }
 
 INSTANTIATE_TEST_SUITE_P(Compressions, RosbagOfPython, ::testing::Values("none", "bz2", "lz4"),

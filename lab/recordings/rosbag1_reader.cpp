@@ -36,12 +36,15 @@ void Rosbag1Reader::learn_connections() {
   for (BagChunk& chunk : layout_.chunks) {
     if (!chunk.indexed || chunk.new_connections) {
       BagChunkReader reader(*file_, chunk);
-      const auto learn = [&](BagConnection connection) { connections_.try_emplace(connection.id, std::move(connection)); };
+      const auto learn = [&](const BagConnection& connection) {
+        if (connections_.size() < most_connections) connections_.try_emplace(connection.id, connection);
+      };
       std::map<std::uint32_t, TimesSummary> times;
       TimesSummary all;
       while (const auto entry = reader.scan(learn)) {
-        times[entry->connection].add(entry->time);
         all.add(entry->time);
+        if (layout_.times.size() + times.size() < most_connections || times.contains(entry->connection))
+          times[entry->connection].add(entry->time);
       }
       note(reader.damage());
       if (!chunk.indexed) {

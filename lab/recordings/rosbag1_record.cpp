@@ -51,15 +51,15 @@ bool set(BagRecordHeader& header, const BagField& field) {
 
 }  // namespace
 
-std::optional<BagRecordHeader> parse_bag_header(Bytes bytes) {
-  BagRecordHeader header;
-  ByteReader reader(bytes);
+std::optional<BagRecordHeader> parse_bag_header(Bytes header) {
+  BagRecordHeader parsed;
+  ByteReader reader(header);
   while (reader.remaining() > 0) {
     const auto field = read_field(reader);
-    if (!field || !set(header, *field)) return std::nullopt;
+    if (!field || !set(parsed, *field)) return std::nullopt;
   }
-  if (!header.op) return std::nullopt;
-  return header;
+  if (!parsed.op) return std::nullopt;
+  return parsed;
 }
 
 std::optional<BagConnection> parse_connection(const BagRecordHeader& header, Bytes data) {
@@ -73,7 +73,6 @@ std::optional<BagConnection> parse_connection(const BagRecordHeader& header, Byt
     if (!field) return std::nullopt;
     if (field->name == "type") connection.type = as_text(field->value);
     if (field->name == "md5sum") connection.md5sum = as_text(field->value);
-    if (field->name == "message_definition") connection.definition = as_text(field->value);
   }
   return connection.topic.empty() || connection.type.empty() ? std::nullopt : std::optional(std::move(connection));
 }

@@ -37,7 +37,6 @@ struct BagConnection {
   std::string topic;
   std::string type;  // "sensor_msgs/Imu"
   std::string md5sum;
-  std::string definition;
 };
 
 /// From the header and the data of a connection record.

@@ -7,7 +7,8 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t block_bytes = 1 << 20;
+constexpr std::size_t first_block_bytes = 4 << 10;  // the next chunk is often near
+constexpr std::size_t most_block_bytes = 1 << 20;
 constexpr std::size_t longest_chunk_header = 128;  // three short fields: 40 bytes as everybody writes them
 
 // The one field that every chunk header has, wherever it stands among the others: length 4, op=5.
@@ -36,16 +37,18 @@ std::optional<std::uint64_t> find_chunk(const FileBytes& file, std::uint64_t fro
   // Blocks overlap by two headers, so that a header on their border is whole in one of them.
   constexpr std::size_t overlap = 2 * longest_chunk_header;
   const std::boyer_moore_horspool_searcher searcher(op_field.begin(), op_field.end());
-  if (from >= file.size()) return std::nullopt;
-  std::vector<std::uint8_t> block(static_cast<std::size_t>(std::min<std::uint64_t>(block_bytes, file.size() - from)));
-  for (std::uint64_t at = from; at < file.size(); at += block_bytes - overlap) {
+  std::vector<std::uint8_t> block;
+  std::size_t block_bytes = first_block_bytes;
+  for (std::uint64_t at = from; at < file.size(); at += block.size() - overlap) {
+    block.resize(block_bytes);
     const Bytes bytes = Bytes(block).first(file.read_at(at, block));
     auto op = bytes.begin();
     while ((op = std::search(op, bytes.end(), searcher)) != bytes.end()) {
       if (const auto begin = record_around(bytes, static_cast<std::size_t>(op - bytes.begin()))) return at + *begin;
       ++op;
     }
-    if (bytes.size() < block_bytes) break;
+    if (bytes.size() < block.size()) break;
+    block_bytes = std::min(2 * block_bytes, most_block_bytes);
   }
   return std::nullopt;
 }

@@ -44,13 +44,13 @@ inline std::vector<Measurement> tiny_walk(int milliseconds = 500) {
   for (int ms = 0; ms < milliseconds; ms += 5) {
     const Time t = tiny_begin + std::chrono::milliseconds(ms);
     const double x = 0.001 * ms;
-    all.push_back(JointSample{t, {"left_knee_joint", "right_knee_joint"}, {x, -x}, {1, -1}, {}});
-    if (ms % 10 == 0) all.push_back(ImuSample{t, {x, 0, -x}, {0, 0, 9.81}});
+    all.emplace_back(JointSample{t, {"left_knee_joint", "right_knee_joint"}, {x, -x}, {1, -1}, {}});
+    if (ms % 10 == 0) all.emplace_back(ImuSample{t, {x, 0, -x}, {0, 0, 9.81}});
     if (ms % 100 == 0) {
       LidarScan scan{t, {}};
       for (int i = 0; i < 120; ++i) scan.points.push_back({1, static_cast<float>(i), 2, static_cast<float>(ms), i * 500'224});
-      all.push_back(std::move(scan));
-      all.push_back(CameraImage{t, {16, 8, 1, std::vector<std::uint8_t>(128, static_cast<std::uint8_t>(ms / 10))}});
+      all.emplace_back(std::move(scan));
+      all.emplace_back(CameraImage{t, {16, 8, 1, std::vector<std::uint8_t>(128, static_cast<std::uint8_t>(ms / 10))}});
     }
   }
   return all;
@@ -86,7 +86,7 @@ inline std::vector<KeptMessage> read_all(const std::filesystem::path& path) {
 
 inline std::vector<std::uint8_t> file_content(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
 inline void set_file_content(const std::filesystem::path& path, Bytes content) {

@@ -10,11 +10,11 @@ namespace {
 using Connections = std::map<std::uint32_t, BagConnection>;
 
 Connections g1_topics() {
-  return {{0, {0, "/livox/imu", "sensor_msgs/Imu", "", ""}},
-          {1, {1, "/livox/lidar", "sensor_msgs/PointCloud2", "", ""}},
-          {2, {2, "/camera/color/image_raw/compressed", "sensor_msgs/CompressedImage", "", ""}},
-          {3, {3, "/camera/color/camera_info", "sensor_msgs/CameraInfo", "", ""}},
-          {4, {4, "/livox/inu", "std_msgs/String", "", ""}}};
+  return {{0, {0, "/livox/imu", "sensor_msgs/Imu", ""}},
+          {1, {1, "/livox/lidar", "sensor_msgs/PointCloud2", ""}},
+          {2, {2, "/camera/color/image_raw/compressed", "sensor_msgs/CompressedImage", ""}},
+          {3, {3, "/camera/color/camera_info", "sensor_msgs/CameraInfo", ""}},
+          {4, {4, "/livox/inu", "std_msgs/String", ""}}};
 }
 
 std::string error_of(const Connections& connections, Sensor sensor, const std::string& pattern) {
@@ -36,7 +36,7 @@ TEST(ChooseTopic, TakesTheTopicByName) {
 TEST(ChooseTopic, ACameraTopicMeansItsCompressedImagesToo) {
   auto topics = g1_topics();
   EXPECT_EQ(choose_topic(topics, Sensor::camera, "/camera/color/image_raw").topic, "/camera/color/image_raw/compressed");
-  topics[9] = {9, "/camera/color/image_raw", "sensor_msgs/Image", "", ""};
+  topics[9] = {9, "/camera/color/image_raw", "sensor_msgs/Image", ""};
   EXPECT_EQ(choose_topic(topics, Sensor::camera, "/camera/color/image_raw").topic, "/camera/color/image_raw")
       << "raw images need no decoding";
   EXPECT_EQ(choose_topic(topics, Sensor::camera, "/camera/color/image_raw/compressed").topic, "/camera/color/image_raw/compressed");
