@@ -69,7 +69,8 @@ Origin origin_of(const CloudLayout& cloud, const CloudField& field, const PointT
   const std::int64_t scale = nanoseconds_in(format.unit);
   if (format.reference == TimeReference::absolute) {
     const std::int64_t stamp = to_ns(cloud.stamp);
-    const auto value = static_cast<double>(stamp / scale);
+    const std::int64_t whole = stamp / scale;
+    const auto value = static_cast<double>(whole);
     return {value, static_cast<double>(stamp - static_cast<std::int64_t>(value) * scale)};
   }
   if (format.reference == TimeReference::other_clock) {

@@ -43,7 +43,7 @@ TEST(DecodePointCloud2, ReadsBigEndianClouds) {
   TinyCloud cloud;
   cloud.big_endian = true;
   cloud.width = 3;
-  cloud.data.resize(3 * cloud.point_step);
+  cloud.data.resize(std::size_t{3} * cloud.point_step);
   for (std::size_t i = 0; i < 3; ++i) cloud.set_point(i, 1.5F, -2, static_cast<float>(i), 7);
   cloud.with_times<float>("time", ScalarType::float32, [](std::size_t i) { return 0.01 * static_cast<double>(i); });
   const auto decoded = decode_point_cloud2(cloud.bytes(), seconds_from_start);
@@ -57,7 +57,7 @@ TEST(DecodePointCloud2, ReadsOrganisedCloudsWithPaddedRows) {
   cloud.height = 2;
   cloud.width = 3;
   cloud.row_step = 3 * cloud.point_step + 11;
-  cloud.data.assign(2 * *cloud.row_step, 0xEE);
+  cloud.data.assign(std::size_t{2} * *cloud.row_step, 0xEE);
   for (std::size_t i = 0; i < 6; ++i) cloud.set_point(i, static_cast<float>(i), 0, 0, 0);
   auto bytes = cloud.bytes();
   auto decoded = decode_point_cloud2(bytes, untimed);
@@ -80,7 +80,7 @@ TEST(DecodePointCloud2, ReadsDoubleCoordinatesAndByteIntensityInAnyOrder) {
                   {"y", 19, ScalarType::float64}};
   cloud.point_step = 29;
   cloud.width = 2;
-  cloud.data.resize(2 * 29);
+  cloud.data.resize(std::size_t{2} * 29);
   cloud.set(1, 2, std::uint8_t{200});
   cloud.set(1, 3, 3.25);
   cloud.set(1, 11, 1.25);

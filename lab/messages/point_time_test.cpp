@@ -142,6 +142,7 @@ TEST(PointTime, OnAYoungClockRelativeTimesAreNotTakenForAbsolute) {
 TEST(PointTime, TheFieldThatMakesSenseWinsOverOneThatDoesNot) {
   auto messages = scans<float>("time", ScalarType::float32, [](std::int64_t, double s) { return s; });
   std::vector<CloudTimes> clouds;
+  clouds.reserve(messages.size());
   for (const auto& message : messages) clouds.push_back(*observe_point_cloud2(message));
   for (auto& cloud : clouds) cloud.candidates.insert(cloud.candidates.begin(), FieldTimes{"timestamp", "float64", 5, 5, 5});
   const auto format = detect_point_time(clouds, period);
