@@ -23,18 +23,20 @@ struct InitialConfig {
   static constexpr auto fields() {
     return std::tuple{
         Field{"still_time", &InitialConfig::still_time, "s", "how long the robot must stand still to start"},
-        Field{"moving_start", &InitialConfig::moving_start, "s", "after so long without standing still it starts moving, with wide uncertainties"},
+        Field{"moving_start", &InitialConfig::moving_start, "s",
+              "after so long without standing still it starts moving, with wide uncertainties"},
         Field{"still_gyro", &InitialConfig::still_gyro, "rad/s", "standing still: standard deviation of the angular rate below this"},
         Field{"still_accel", &InitialConfig::still_accel, "m/s^2", "standing still: standard deviation of the acceleration below this"},
-        Field{"gravity_sigma", &InitialConfig::gravity_sigma, "m/s^2", "how far the accelerometer bias may tilt the first gravity, each way"},
+        Field{"gravity_sigma", &InitialConfig::gravity_sigma, "m/s^2",
+              "how far the accelerometer bias may tilt the first gravity, each way"},
         Field{"gyro_bias_sigma", &InitialConfig::gyro_bias_sigma, "rad/s", "uncertainty of the gyro bias measured at rest"},
         Field{"velocity_sigma", &InitialConfig::velocity_sigma, "m/s", "uncertainty of the velocity at rest"}};
   }
 };
 
 struct EstimatorConfig {
-  double max_wait = 0.2;      // s
-  double max_imu_gap = 0.1;   // s
+  double max_wait = 0.2;     // s
+  double max_imu_gap = 0.1;  // s
   bool gravity_align = true;
   int threads = 1;
 
@@ -45,10 +47,11 @@ struct EstimatorConfig {
   LidarConfig lidar;
 
   static constexpr auto fields() {
-    return std::tuple{Field{"max_wait", &EstimatorConfig::max_wait, "s", "how long, in data time, a measurement waits for others of earlier stamps"},
-                      Field{"max_imu_gap", &EstimatorConfig::max_imu_gap, "s", "a longer gap between IMU samples is bridged with wide uncertainties"},
-                      Field{"gravity_align", &EstimatorConfig::gravity_align, "-", "z of the world is up; false: the world is the first IMU frame"},
-                      Field{"threads", &EstimatorConfig::threads, "-", "threads for sums over many points, 0: all cores; results do not depend on it"}};
+    return std::tuple{
+        Field{"max_wait", &EstimatorConfig::max_wait, "s", "how long, in data time, a measurement waits for others of earlier stamps"},
+        Field{"max_imu_gap", &EstimatorConfig::max_imu_gap, "s", "a longer gap between IMU samples is bridged with wide uncertainties"},
+        Field{"gravity_align", &EstimatorConfig::gravity_align, "-", "z of the world is up; false: the world is the first IMU frame"},
+        Field{"threads", &EstimatorConfig::threads, "-", "threads for sums over many points, 0: all cores; results do not depend on it"}};
   }
 };
 

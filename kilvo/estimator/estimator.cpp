@@ -55,7 +55,8 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       map_(config.map),
       workers_(config.threads) {
   if (!used[static_cast<std::size_t>(Sensor::imu)]) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
-  if (config.lidar.voxel_size > map_.leaf_size() * (1 + 1e-9)) throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
+  if (config.lidar.voxel_size > map_.leaf_size() * (1 + 1e-9))
+    throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
 }
 
 std::vector<Output> Estimator::push(Measurement m) {
@@ -139,7 +140,8 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   if (!start.still) statistics_.warnings.push_back("the robot did not stand still: started on the move, with wide uncertainties");
   const double norm = start.resting_norm * start.accel_scale;
   if (std::abs(norm - standard_gravity) > 0.1 * standard_gravity) {
-    statistics_.warnings.push_back("the accelerometer measured " + std::to_string(start.resting_norm) + " at the start: neither 9.8 m/s^2 nor 1 g");
+    statistics_.warnings.push_back("the accelerometer measured " + std::to_string(start.resting_norm) +
+                                   " at the start: neither 9.8 m/s^2 nor 1 g");
   }
   // Since the robot stood still, what came during the window is as good as what comes now.
   std::deque<Measurement> waiting;

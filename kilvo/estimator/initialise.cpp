@@ -56,7 +56,8 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   const auto accel = statistics_of(window_, &ImuSample::accel);
   const double unit = unit_of(accel.mean.norm());
   constexpr double largest_gyro_bias = 0.1;  // rad/s
-  const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && gyro.mean.norm() < largest_gyro_bias && accel.sigma.maxCoeff() * unit < config_.still_accel;
+  const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && gyro.mean.norm() < largest_gyro_bias &&
+                     accel.sigma.maxCoeff() * unit < config_.still_accel;
   if (still) return start(true);
   if (s.t - *first_ >= from_seconds(config_.moving_start)) return start(false);
   return std::nullopt;
@@ -90,7 +91,8 @@ Start Initialiser::start(bool still) const {
     e.x.bg = gyro;
     e.x.ba = (accel.norm() - standard_gravity) * up_I;
     constexpr double unknown_gravity = 0.02;  // m/s^2, how much gravity differs between places
-    e.P.block<3, 3>(at::ba, at::ba) += Rt * gravity * Rt.transpose() + unknown_gravity * unknown_gravity * up_I * up_I.transpose() + 1e-6 * Eigen::Matrix3d::Identity();
+    e.P.block<3, 3>(at::ba, at::ba) +=
+        Rt * gravity * Rt.transpose() + unknown_gravity * unknown_gravity * up_I * up_I.transpose() + 1e-6 * Eigen::Matrix3d::Identity();
     e.P.block<3, 3>(at::ba, at::g) = Rt * gravity;
     e.P.block<3, 3>(at::g, at::ba) = gravity * Rt.transpose();
     e.P.diagonal().segment<3>(at::bg).array() += config_.gyro_bias_sigma * config_.gyro_bias_sigma;

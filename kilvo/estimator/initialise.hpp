@@ -12,8 +12,8 @@
 namespace kilvo {
 
 struct Start {
-  Estimate estimate;        // at the first sample of the still window, or at the last sample of a moving start
-  double accel_scale = 1;   // from the IMU's unit to m/s^2
+  Estimate estimate;       // at the first sample of the still window, or at the last sample of a moving start
+  double accel_scale = 1;  // from the IMU's unit to m/s^2
   bool still = true;
   double resting_norm = 0;  // of the accelerometer, in its own unit
 };

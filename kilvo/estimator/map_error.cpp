@@ -10,6 +10,8 @@ namespace {
 // A new epoch begins when a variance has changed by this factor, so their number grows with the logarithm of the uncertainty.
 constexpr double change = 1.25;
 constexpr std::size_t max_epochs = 65536;
+// What planes that are not quite planes cost where all directions are held equally, m.
+constexpr double plane_error = 0.00015;
 
 // (theta in the body, error of p) -> twist of the world at its origin: phi = R theta, u = dp + p x phi.
 PoseCovariance to_origin(const SE3& T) {
@@ -74,8 +76,13 @@ void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epo
   const PoseCovariance G = from_origin(T_WI);
   PoseCovariance root = PoseCovariance::Zero();
   for (const EpochInformation& e : epochs) root += inverse * e.A * root_of(G * epochs_[e.epoch] * G.transpose());
+  // Planes that are not quite planes move the pose most along the directions that few of them hold.
+  const Eigen::Matrix3d looseness =
+      (A.bottomRightCorner<3, 3>().trace() / 3.0) * inverse.bottomRightCorner<3, 3>();  // 1 where all are held equally
+  PoseCovariance systematic = PoseCovariance::Zero();
+  systematic.bottomRightCorner<3, 3>() = plane_error * plane_error * looseness * looseness;
   const PoseCovariance H = to_origin(T_WI);
-  now_ = H * (root * root.transpose() + weak * at(T_WI) * weak.transpose()) * H.transpose();
+  now_ = H * (root * root.transpose() + systematic + weak * at(T_WI) * weak.transpose()) * H.transpose();
 }
 
 }  // namespace kilvo

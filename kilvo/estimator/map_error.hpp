@@ -27,8 +27,8 @@ class MapError {
   void registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak);
 
  private:
-  std::vector<PoseCovariance> epochs_;                    // as twists at the world's origin
-  PoseCovariance now_ = PoseCovariance::Zero();           // likewise
+  std::vector<PoseCovariance> epochs_;           // as twists at the world's origin
+  PoseCovariance now_ = PoseCovariance::Zero();  // likewise
 };
 
 }  // namespace kilvo

@@ -26,9 +26,9 @@ struct Output {
   State x;
   Covariance P = Covariance::Zero();  // of the error relative to the first pose (state.hpp: at)
   Modality modality = Modality::coast;
-  bool is_sweep = false;              // state after the last update of a sweep
+  bool is_sweep = false;  // state after the last update of a sweep
   // Only of sweeps:
-  std::vector<PointXYZI> points_W;    // undistorted, in the world
+  std::vector<PointXYZI> points_W;  // undistorted, in the world
   RegistrationReport registration;
   StageTimes stages;
 };
@@ -44,7 +44,7 @@ struct Statistics {
   PointDrops points;                              // LiDAR points not used, by cause
   std::uint64_t rollbacks = 0;                    // a non-finite state was thrown away
   bool diverged = false;
-  std::vector<std::string> warnings;              // each said once
+  std::vector<std::string> warnings;  // each said once
 };
 
 }  // namespace kilvo

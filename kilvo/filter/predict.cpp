@@ -8,8 +8,8 @@ namespace {
 // The motion of one interval: rotation R0 -> R1, specific force turned into the world at both ends and taken as linear between.
 struct Motion {
   double dt;
-  Eigen::Vector3d phi;             // rotation vector of the interval
-  SO3 turn;                        // Exp(phi)
+  Eigen::Vector3d phi;  // rotation vector of the interval
+  SO3 turn;             // Exp(phi)
   SO3 R1;
   Eigen::Vector3d alpha0, alpha1;  // bias-free specific force in the body at both ends
   Eigen::Vector3d f0, f1;          // the same in the world

@@ -36,13 +36,15 @@ struct ProcessNoise {
   double exposure = 0.05;    // 1/sqrt(s)
 
   static constexpr auto fields() {
-    return std::tuple{Field{"gyro_noise", &ProcessNoise::gyro, "rad/s/sqrt(Hz)", "noise density of the gyro, aliased impacts included"},
-                      Field{"accel_noise", &ProcessNoise::accel, "m/s^2/sqrt(Hz)", "noise density of the accelerometer, aliased impacts included"},
-                      Field{"velocity_noise", &ProcessNoise::velocity, "m/s/sqrt(Hz)", "noise density of the integrated acceleration that does not accumulate: aliased impacts that the next samples take back"},
-                      Field{"gyro_bias_walk", &ProcessNoise::gyro_bias, "rad/s/sqrt(s)", "random walk of the gyro bias"},
-                      Field{"accel_bias_walk", &ProcessNoise::accel_bias, "m/s^2/sqrt(s)", "random walk of the accelerometer bias"},
-                      Field{"foot_noise", &ProcessNoise::foot, "m/sqrt(s)", "random walk of a standing foot"},
-                      Field{"exposure_walk", &ProcessNoise::exposure, "1/sqrt(s)", "random walk of the relative inverse exposure"}};
+    return std::tuple{
+        Field{"gyro_noise", &ProcessNoise::gyro, "rad/s/sqrt(Hz)", "noise density of the gyro, aliased impacts included"},
+        Field{"accel_noise", &ProcessNoise::accel, "m/s^2/sqrt(Hz)", "noise density of the accelerometer, aliased impacts included"},
+        Field{"velocity_noise", &ProcessNoise::velocity, "m/s/sqrt(Hz)",
+              "noise density of the integrated acceleration that does not accumulate: aliased impacts that the next samples take back"},
+        Field{"gyro_bias_walk", &ProcessNoise::gyro_bias, "rad/s/sqrt(s)", "random walk of the gyro bias"},
+        Field{"accel_bias_walk", &ProcessNoise::accel_bias, "m/s^2/sqrt(s)", "random walk of the accelerometer bias"},
+        Field{"foot_noise", &ProcessNoise::foot, "m/sqrt(s)", "random walk of a standing foot"},
+        Field{"exposure_walk", &ProcessNoise::exposure, "1/sqrt(s)", "random walk of the relative inverse exposure"}};
   }
 };
 

@@ -33,8 +33,8 @@ ErrorVector boxminus(const State& a, const State& b) {
 }
 
 bool is_finite(const Estimate& e) {
-  return e.x.R.matrix().allFinite() && e.x.p.allFinite() && e.x.v.allFinite() && e.x.bg.allFinite() && e.x.ba.allFinite() && e.x.g.allFinite() &&
-         e.x.pc[0].allFinite() && e.x.pc[1].allFinite() && std::isfinite(e.x.tau) && e.P.allFinite();
+  return e.x.R.matrix().allFinite() && e.x.p.allFinite() && e.x.v.allFinite() && e.x.bg.allFinite() && e.x.ba.allFinite() &&
+         e.x.g.allFinite() && e.x.pc[0].allFinite() && e.x.pc[1].allFinite() && std::isfinite(e.x.tau) && e.P.allFinite();
 }
 
 }  // namespace kilvo

@@ -22,14 +22,15 @@ using Covariance = Eigen::Matrix<double, at::size, at::size>;
 using PoseCovariance = Eigen::Matrix<double, 6, 6>;  // of (rotation, position)
 
 struct State {
-  SO3 R;                                            // R_WI
-  Eigen::Vector3d p = Eigen::Vector3d::Zero();      // IMU in the world, m
-  Eigen::Vector3d v = Eigen::Vector3d::Zero();      // in the world, m/s
-  Eigen::Vector3d bg = Eigen::Vector3d::Zero();     // gyro bias, rad/s
-  Eigen::Vector3d ba = Eigen::Vector3d::Zero();     // accelerometer bias, m/s^2
-  Eigen::Vector3d g = {0, 0, -standard_gravity};    // gravity in the world, m/s^2; its length never changes
-  std::array<Eigen::Vector3d, 2> pc = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};  // contact positions in the world, left and right, m
-  double tau = 1;                                   // inverse camera exposure, relative to the first image
+  SO3 R;                                          // R_WI
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();    // IMU in the world, m
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();    // in the world, m/s
+  Eigen::Vector3d bg = Eigen::Vector3d::Zero();   // gyro bias, rad/s
+  Eigen::Vector3d ba = Eigen::Vector3d::Zero();   // accelerometer bias, m/s^2
+  Eigen::Vector3d g = {0, 0, -standard_gravity};  // gravity in the world, m/s^2; its length never changes
+  std::array<Eigen::Vector3d, 2> pc = {Eigen::Vector3d::Zero(),
+                                       Eigen::Vector3d::Zero()};  // contact positions in the world, left and right, m
+  double tau = 1;                                                 // inverse camera exposure, relative to the first image
 
   SE3 pose() const { return {R, p}; }
 };

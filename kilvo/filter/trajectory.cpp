@@ -9,7 +9,8 @@ SE3 between(const Trajectory::Entry& a, const Trajectory::Entry& b, Time t) {
   const double span = to_seconds(b.t - a.t);
   const double s = to_seconds(t - a.t) / span;
   const double s2 = s * s, s3 = s2 * s;
-  const Eigen::Vector3d p = (2 * s3 - 3 * s2 + 1) * a.T_WI.p + (s3 - 2 * s2 + s) * span * a.v_W + (3 * s2 - 2 * s3) * b.T_WI.p + (s3 - s2) * span * b.v_W;
+  const Eigen::Vector3d p =
+      (2 * s3 - 3 * s2 + 1) * a.T_WI.p + (s3 - 2 * s2 + s) * span * a.v_W + (3 * s2 - 2 * s3) * b.T_WI.p + (s3 - s2) * span * b.v_W;
   return {a.T_WI.R * SO3::Exp(s * (a.T_WI.R.inverse() * b.T_WI.R).Log()), p};
 }
 
@@ -23,7 +24,8 @@ void Trajectory::push(Time t, const SE3& T_WI, const Eigen::Vector3d& v_W) {
   }
   // Dropping in batches keeps the cost per push constant.
   if (entries_.size() >= 64 && entries_.front().t < t - 2 * keep_) {
-    const auto first = std::lower_bound(entries_.begin(), entries_.end(), t - keep_, [](const Entry& e, Time value) { return e.t < value; });
+    const auto first =
+        std::lower_bound(entries_.begin(), entries_.end(), t - keep_, [](const Entry& e, Time value) { return e.t < value; });
     // The entry before the kept span stays, so that the whole span can be interpolated.
     if (first != entries_.begin()) entries_.erase(entries_.begin(), first - 1);
   }

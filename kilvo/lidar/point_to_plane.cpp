@@ -28,8 +28,8 @@ PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, cons
   return row;
 }
 
-LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const PoseCovariance& map_error,
-                       const LidarConfig& config, const Workers& workers)
+LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL,
+                       const PoseCovariance& map_error, const LidarConfig& config, const Workers& workers)
     : map_(map),
       clusters_(clusters),
       p_IL_(p_IL),
@@ -91,7 +91,7 @@ LidarModel::Association LidarModel::associate(const PointCluster& cluster, const
 }
 
 struct LidarModel::Sums {
-  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();     // lower triangles
+  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();  // lower triangles
   Eigen::Matrix<double, 6, 6> fake = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
   double chi2 = 0;

@@ -38,8 +38,8 @@ struct EpochInformation {
 /// The model that `update` calls: at each iterate it looks the planes up anew, gates, and sums the rows.
 class LidarModel {
  public:
-  /// Keeps references: the map, the clusters and the workers must outlive it. `map_error`: covariance of the pose from the map's own error, by which
-  /// the gate is wider than the filter's covariance says.
+  /// Keeps references: the map, the clusters and the workers must outlive it. `map_error`: covariance of the pose from the map's own error,
+  /// by which the gate is wider than the filter's covariance says.
   LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const PoseCovariance& map_error,
              const LidarConfig& config, const Workers& workers);
 

@@ -10,9 +10,9 @@ namespace kilvo {
 
 /// Points that were seen together in one small cell: their number, mean and scatter stand for all of them.
 struct PointGroup {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();      // m
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();   // sum of (x - mean)(x - mean)', m^2
-  Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();     // measurement covariance of one point, m^2
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();     // m
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();  // sum of (x - mean)(x - mean)', m^2
+  Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();    // measurement covariance of one point, m^2
   double count = 0;
 };
 
@@ -33,13 +33,13 @@ class Moments {
 };
 
 struct Plane {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   // mean of its points, m
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // mean of its points, m
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();
-  Eigen::Vector3f axis = Eigen::Vector3f::UnitX();    // in the plane, direction of largest extent; the other is normal x axis
-  float tilt_variance_1 = 0;                          // of the normal's turn towards `axis`, rad^2
-  float tilt_variance_2 = 0;                          // towards the other axis, rad^2
-  float offset_variance = 0;                          // of the centre along the normal, m^2
-  float roughness_variance = 0;                       // how far the surface itself leaves the plane, m^2
+  Eigen::Vector3f axis = Eigen::Vector3f::UnitX();  // in the plane, direction of largest extent; the other is normal x axis
+  float tilt_variance_1 = 0;                        // of the normal's turn towards `axis`, rad^2
+  float tilt_variance_2 = 0;                        // towards the other axis, rad^2
+  float offset_variance = 0;                        // of the centre along the normal, m^2
+  float roughness_variance = 0;                     // how far the surface itself leaves the plane, m^2
 
   /// Signed distance of a point, m.
   double distance(const Eigen::Vector3d& x) const { return normal.cast<double>().dot(x - centre); }

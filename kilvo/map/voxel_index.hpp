@@ -14,7 +14,8 @@ using VoxelKey = std::uint64_t;
 /// Packs integer coordinates of 21 bits each (about +-1 million voxels).
 inline VoxelKey pack_key(std::int64_t x, std::int64_t y, std::int64_t z) {
   constexpr std::uint64_t mask = (1ULL << 21) - 1;
-  return (static_cast<std::uint64_t>(x) & mask) | ((static_cast<std::uint64_t>(y) & mask) << 21) | ((static_cast<std::uint64_t>(z) & mask) << 42);
+  return (static_cast<std::uint64_t>(x) & mask) | ((static_cast<std::uint64_t>(y) & mask) << 21) |
+         ((static_cast<std::uint64_t>(z) & mask) << 42);
 }
 
 /// floor() without a library call; |x| must be below 2^31.

@@ -63,7 +63,8 @@ bool VoxelMap::settled_and_explains(const Node& node, const PointGroup& group) c
   if (!node.is_plane || node.moments.count() < config_.full_points) return false;
   const Eigen::Vector3d n = node.plane.normal.cast<double>();
   const double d = node.plane.distance(group.mean);
-  const double variance = n.dot(group.noise * n) / group.count + static_cast<double>(node.plane.roughness_variance) + node.plane.variance_at(group.mean);
+  const double variance =
+      n.dot(group.noise * n) / group.count + static_cast<double>(node.plane.roughness_variance) + node.plane.variance_at(group.mean);
   return d * d < settled_sigmas * settled_sigmas * variance;
 }
 
@@ -171,8 +172,8 @@ void VoxelMap::forget(const Eigen::Vector3d& centre) {
 std::size_t VoxelMap::bytes_per_node() { return sizeof(Node) + sizeof(Children); }
 
 std::size_t VoxelMap::memory_bytes() const {
-  return nodes_.blocks.size() * block_size * sizeof(Node) + children_.blocks.size() * block_size * sizeof(Children) + roots_.capacity() * 16 +
-         keys_.capacity() * sizeof(VoxelKey);
+  return nodes_.blocks.size() * block_size * sizeof(Node) + children_.blocks.size() * block_size * sizeof(Children) +
+         roots_.capacity() * 16 + keys_.capacity() * sizeof(VoxelKey);
 }
 
 }  // namespace kilvo

@@ -16,18 +16,19 @@
 namespace kilvo {
 
 struct MapConfig {
-  double voxel_size = 1.0;       // m
+  double voxel_size = 1.0;  // m
   double min_points = 8;
-  double max_roughness = 0.03;   // m
+  double max_roughness = 0.03;  // m
   double full_points = 2000;
-  double radius = 120;           // m
+  double radius = 120;  // m
   int max_nodes = 600000;
 
   static constexpr auto fields() {
     return std::tuple{
         Field{"voxel_size", &MapConfig::voxel_size, "m", "edge of a root voxel; it is halved twice where its points lie on no plane"},
         Field{"min_points", &MapConfig::min_points, "-", "fewer points make no plane"},
-        Field{"max_roughness", &MapConfig::max_roughness, "m", "a surface that leaves its plane by more than this standard deviation, measurement noise apart, is no plane"},
+        Field{"max_roughness", &MapConfig::max_roughness, "m",
+              "a surface that leaves its plane by more than this standard deviation, measurement noise apart, is no plane"},
         Field{"full_points", &MapConfig::full_points, "-", "a plane of this many points is settled and takes no more"},
         Field{"radius", &MapConfig::radius, "m", "voxels farther from the robot are forgotten"},
         Field{"max_nodes", &MapConfig::max_nodes, "-", "octree nodes at most; the farthest voxels are forgotten first"}};

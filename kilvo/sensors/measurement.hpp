@@ -29,9 +29,9 @@ struct JointSample {
 };
 
 struct LidarPoint {
-  float x = 0, y = 0, z = 0;     // m, LiDAR frame
-  float intensity = 0;           // 0..255, sensor's own scale
-  std::int32_t offset_ns = 0;    // time of this point minus LidarScan::t
+  float x = 0, y = 0, z = 0;   // m, LiDAR frame
+  float intensity = 0;         // 0..255, sensor's own scale
+  std::int32_t offset_ns = 0;  // time of this point minus LidarScan::t
 };
 
 /// One LiDAR message. Points need not be sorted by time, may be non-finite or at the origin: the estimator drops and counts those.

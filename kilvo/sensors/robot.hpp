@@ -38,10 +38,12 @@ struct LegsMount {
   double sole_offset = 0;       // two-feet message: from its foot point down to the sole, m
 
   static constexpr auto fields() {
-    return std::tuple{Field{"type", &LegsMount::type, "-", "what the leg message holds: joints (sensor_msgs/JointState by name) or feet (two foot positions)"},
-                      Field{"rate", &LegsMount::rate, "Hz", "nominal rate of the leg messages"},
-                      Field{"time_offset", &LegsMount::time_offset, "s", "added to the stamps of the leg messages"},
-                      Field{"sole_offset", &LegsMount::sole_offset, "m", "two-feet message: distance from its foot point down to the sole"}};
+    return std::tuple{
+        Field{"type", &LegsMount::type, "-",
+              "what the leg message holds: joints (sensor_msgs/JointState by name) or feet (two foot positions)"},
+        Field{"rate", &LegsMount::rate, "Hz", "nominal rate of the leg messages"},
+        Field{"time_offset", &LegsMount::time_offset, "s", "added to the stamps of the leg messages"},
+        Field{"sole_offset", &LegsMount::sole_offset, "m", "two-feet message: distance from its foot point down to the sole"}};
   }
 };
 
@@ -61,13 +63,13 @@ struct LidarMount {
 };
 
 struct CameraMount {
-  double rate = 10;                        // Hz, nominal
-  double time_offset = 0;                  // s, added to the stamps
-  std::string model = "pinhole_radtan";    // pinhole_radtan | equidistant
-  int width = 0, height = 0;               // pixels
-  double fx = 0, fy = 0, cx = 0, cy = 0;   // pixels
-  std::vector<double> distortion;          // k1 k2 p1 p2 [k3], or k1..k4 of the equidistant model
-  SE3 T_imu_camera;                        // optical frame: z forward, x right, y down
+  double rate = 10;                       // Hz, nominal
+  double time_offset = 0;                 // s, added to the stamps
+  std::string model = "pinhole_radtan";   // pinhole_radtan | equidistant
+  int width = 0, height = 0;              // pixels
+  double fx = 0, fy = 0, cx = 0, cy = 0;  // pixels
+  std::vector<double> distortion;         // k1 k2 p1 p2 [k3], or k1..k4 of the equidistant model
+  SE3 T_imu_camera;                       // optical frame: z forward, x right, y down
 
   static constexpr auto fields() {
     return std::tuple{Field{"rate", &CameraMount::rate, "Hz", "nominal rate of the images"},

@@ -88,7 +88,8 @@ ImuSample AnalyticRoom::imu_at(double s) {
   ImuSample out;
   out.t = start_ + from_seconds(s);
   out.gyro = omega + config_.gyro_bias + config_.gyro_noise * root_rate * gaussian();
-  out.accel = T.R.inverse() * (accel + Eigen::Vector3d(0, 0, analytic_gravity)) + config_.accel_bias + config_.accel_noise * root_rate * gaussian();
+  out.accel =
+      T.R.inverse() * (accel + Eigen::Vector3d(0, 0, analytic_gravity)) + config_.accel_bias + config_.accel_noise * root_rate * gaussian();
   return out;
 }
 
@@ -125,7 +126,8 @@ LidarScan AnalyticRoom::scan_at(double s) {
     const double range = range_to_surface(T.p, T.R * direction);
     if (range > config_.max_range) continue;
     const Eigen::Vector3d across = config_.angle_noise * gaussian();
-    const Eigen::Vector3d measured = (range + config_.range_noise * n(random_)) * (direction + across - across.dot(direction) * direction).normalized();
+    const Eigen::Vector3d measured =
+        (range + config_.range_noise * n(random_)) * (direction + across - across.dot(direction) * direction).normalized();
     const Eigen::Vector3f p = measured.cast<float>();
     scan.points.push_back({p.x(), p.y(), p.z(), 100.0f, static_cast<std::int32_t>(std::llround(offset * 1e9))});
   }

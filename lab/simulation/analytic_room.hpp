@@ -14,19 +14,19 @@ namespace kilvo::lab {
 
 struct AnalyticRoomConfig {
   std::uint64_t seed = 1;
-  double duration = 20;           // s
-  double still = 1.5;             // s, standing at the start
+  double duration = 20;  // s
+  double still = 1.5;    // s, standing at the start
   enum class Path { loop, straight } path = Path::loop;
-  double imu_rate = 200;          // Hz
-  double gyro_noise = 2e-4;       // rad/s/sqrt(Hz)
-  double accel_noise = 1.5e-3;    // m/s^2/sqrt(Hz)
+  double imu_rate = 200;                                // Hz
+  double gyro_noise = 2e-4;                             // rad/s/sqrt(Hz)
+  double accel_noise = 1.5e-3;                          // m/s^2/sqrt(Hz)
   Eigen::Vector3d gyro_bias = {0.002, -0.001, 0.0015};  // rad/s
   Eigen::Vector3d accel_bias = {0.02, -0.03, 0.01};     // m/s^2
-  double scan_rate = 10;          // Hz
+  double scan_rate = 10;                                // Hz
   int points_per_scan = 20000;
-  double range_noise = 0.02;      // m
-  double angle_noise = 0.001;     // rad
-  double max_range = 60;          // m
+  double range_noise = 0.02;   // m
+  double angle_noise = 0.001;  // rad
+  double max_range = 60;       // m
   SE3 T_imu_lidar = {SO3(), {-0.011, -0.02329, 0.04412}};
 };
 
