@@ -3,15 +3,12 @@
 #include <cerrno>
 #include <cstring>
 #include <fmt/core.h>
-#include <system_error>
 
 #include "lab/mapping/output_error.hpp"
 
 namespace kilvo::cli {
 
-namespace fs = std::filesystem;
-
-CsvFile::CsvFile(fs::path path, std::string_view header) : path_(std::move(path)), file_(std::fopen(path_.c_str(), "wb")) {
+CsvFile::CsvFile(std::filesystem::path path, std::string_view header) : path_(std::move(path)), file_(std::fopen(path_.c_str(), "wb")) {
   if (!file_) fail();
   write(header);
 }
@@ -24,21 +21,6 @@ void CsvFile::write(std::string_view line) {
 
 void CsvFile::close() {
   if (file_ && std::fclose(file_.release()) != 0) fail();
-}
-
-void write_text_file(const fs::path& path, std::string_view text) {
-  CsvFile file(path, text);
-  file.close();
-}
-
-void prepare_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw lab::OutputError(fmt::format("{}: cannot be created: {}", folder.string(), error.message()));
-  if (!fs::is_directory(folder, error)) throw lab::OutputError(fmt::format("{}: is not a folder", folder.string()));
-  const fs::path probe = folder / ".kilvo_can_write_here";
-  write_text_file(probe, "");
-  fs::remove(probe, error);
 }
 
 }  // namespace kilvo::cli

@@ -28,10 +28,4 @@ class CsvFile {
   std::unique_ptr<std::FILE, Closer> file_;
 };
 
-/// Writes a whole file at once.
-void write_text_file(const std::filesystem::path& path, std::string_view text);
-
-/// Creates the folder if need be and makes sure that files can be written in it.
-void prepare_folder(const std::filesystem::path& folder);
-
 }  // namespace kilvo::cli

@@ -36,7 +36,7 @@ void print_topics(const lab::RecordingDescription& about) {
 }
 
 int info(const InfoOptions& options) {
-  const auto config = config_file(options.config.empty() ? std::nullopt : std::optional(options.config));
+  const auto config = config_file(options.config.empty() ? std::nullopt : std::optional(options.config), options.input);
   const lab::Settings settings = lab::load_settings(config);
   lab::RecordingOptions wanted;
   for (const Sensor sensor : every_sensor) {
@@ -58,7 +58,9 @@ void add_info(CLI::App& program, Action& chosen) {
   auto options = std::make_shared<InfoOptions>();
   CLI::App* verb = program.add_subcommand("info", "what is in a recording, and what it would be used for");
   verb->add_option("INPUT", options->input, "ROS 1 bag, or a folder with recording.bag in it")->required();
-  verb->add_option("--config", options->config, "configuration that says what topics are used for; default: the shipped robots/g1.yaml")
+  verb->add_option("--config", options->config,
+                   "configuration that says what topics are used for; default: config.yaml in INPUT if that is a folder, else the shipped "
+                   "robots/g1.yaml")
       ->type_name("FILE");
   verb->callback([options, &chosen] { chosen = [options] { return info(*options); }; });
 }

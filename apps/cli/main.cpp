@@ -25,6 +25,7 @@ int parse_and_do(const std::vector<std::string>& words) {
   add_info(program, chosen);
   add_eval(program, chosen);
   add_config(program, chosen);
+  add_demo(program, chosen);
   check_words(words, program);
   try {
     program.parse(std::vector<std::string>(words.rbegin(), words.rend()));

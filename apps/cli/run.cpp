@@ -1,7 +1,9 @@
 // kilvo run INPUT --out DIR
+#include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
 #include <memory>
+#include <thread>
 
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/run_recording.hpp"
@@ -16,7 +18,7 @@ struct RunWords {
   std::string out, sensors, map, config;
   std::vector<std::string> drops;
   bool no_map = false;
-  int threads = 0;
+  int threads = 0;  // 0: as many as there are cores
 };
 
 int run(RunWords words) {
@@ -28,6 +30,7 @@ int run(RunWords words) {
   if (words.no_map && !words.map.empty()) throw UsageError("--map and --no-map exclude each other");
   if (!words.map.empty()) options.map = words.map;
   options.with_map = !words.no_map;
+  options.threads = words.threads > 0 ? words.threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   if (!(options.start >= 0) || std::isinf(options.start)) throw UsageError("--start must be a number of seconds, 0 or more");
   if (!(options.duration > 0)) throw UsageError("--duration must be a number of seconds above 0");
   return run_recording(options);
@@ -41,7 +44,9 @@ void add_run(CLI::App& program, Action& chosen) {
   CLI::App* verb = program.add_subcommand("run", "estimate trajectory and map from a recording");
   verb->add_option("INPUT", options.input, "ROS 1 bag, or a folder with recording.bag in it")->required();
   verb->add_option("--out", words->out, "folder for the results, created if need be")->type_name("DIR")->required();
-  verb->add_option("--config", words->config, "robot, sensors, topics and tuning; default: the shipped robots/g1.yaml")->type_name("FILE");
+  verb->add_option("--config", words->config,
+                   "robot, sensors, topics and tuning; default: config.yaml in INPUT if that is a folder, else the shipped robots/g1.yaml")
+      ->type_name("FILE");
   verb->add_option("--set", options.overrides, "override one setting, repeatable (lidar.voxel_size=0.2)")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);

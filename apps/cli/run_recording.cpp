@@ -3,10 +3,12 @@
 #include <chrono>
 #include <fmt/core.h>
 
-#include "apps/cli/csv_file.hpp"
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/interrupt.hpp"
+#include "apps/cli/map_keeper.hpp"
+#include "apps/cli/output_folder.hpp"
 #include "apps/cli/progress.hpp"
+#include "apps/cli/read_ahead.hpp"
 #include "apps/cli/result_files.hpp"
 #include "apps/cli/sensor_choice.hpp"
 #include "apps/cli/shipped_config.hpp"
@@ -54,6 +56,7 @@ void tell_start(const RunFacts& facts, const lab::RecordingSource& source, bool 
     if (sensor == Sensor::lidar) detail = no_deskew ? ", each cloud taken at its stamp" : ", point time: " + source.point_time().text();
     fmt::print(stderr, "kilvo: {} from {}{}\n", name_of(sensor), source.topic(sensor), detail);
   }
+  for (const std::string& text : facts.notes) fmt::print(stderr, "kilvo: {}\n", text);
 }
 
 /// Everything between the first message and the last file.
@@ -65,7 +68,7 @@ class Run {
         facts_(std::move(facts)),
         source_(options.input, recording_options(options, settings_, choice.used)),
         estimator_(settings_.robot, settings_.estimator, as_flags(choice.used)),
-        map_(settings_.mapping),
+        map_(settings_.mapping, options.threads > 1),
         files_(options.out),
         progress_(Progress::style_for(options.quiet)) {
     if (!options.quiet) tell_start(facts_, source_, options.no_deskew);
@@ -77,8 +80,9 @@ class Run {
     progress_.finish();
     files_.close();
     facts_.failure = failure(interrupted);
-    if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map_);
-    facts_.map_points = map_.size();
+    const lab::MapBuilder& map = map_.finish();
+    if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map);
+    facts_.map_points = map.size();
     facts_.wall_seconds = std::chrono::duration<double>(WallClock::now() - begin).count();
     facts_.data_seconds = first_ ? to_seconds(last_ - *first_) : 0;
     write_text_file(options_.out / "summary.json", summary_json(facts_, settings_, source_, estimator_.statistics(), files_.recap()));
@@ -90,23 +94,25 @@ class Run {
   // True when the user stopped it.
   bool replay() {
     InterruptWatch interrupt;
+    ReadAhead input(source_, options_.threads > 1);
     bool interrupted = false;
-    while (auto measurement = source_.next()) {
+    while (auto measurement = input.next()) {
       last_ = std::max(last_, stamp_of(*measurement));
       if (!first_) first_ = last_;
       keep(estimator_.push(*std::move(measurement)));
-      progress_.update(source_.progress(), [this] { return progress_note(); });
+      progress_.update(input.progress(), [this] { return progress_note(); });
       interrupted = interrupt.requested();
       if (interrupted) break;
     }
+    input.stop();
     keep(estimator_.finish());
     return interrupted;
   }
 
-  void keep(const std::vector<Output>& outputs) {
-    for (const Output& output : outputs) {
+  void keep(std::vector<Output> outputs) {
+    for (Output& output : outputs) {
       files_.write(output);
-      if (options_.with_map && output.is_sweep) map_.add(output.points_W);
+      if (options_.with_map && output.is_sweep) map_.add(std::move(output.points_W));
     }
   }
 
@@ -144,7 +150,7 @@ class Run {
   RunFacts facts_;
   lab::RecordingSource source_;
   Estimator estimator_;
-  lab::MapBuilder map_;
+  MapKeeper map_;
   ResultFiles files_;
   Progress progress_;
   std::optional<Time> first_;
@@ -154,15 +160,18 @@ class Run {
 }  // namespace
 
 int run_recording(const RunOptions& options) {
-  const std::filesystem::path config = config_file(options.config);
+  const std::filesystem::path config = config_file(options.config, options.input);
   lab::Settings settings = lab::load_settings(config, options.overrides);
   prepare_folder(options.out);
   SensorChoice choice = choose_sensors(options.sensors, settings, config.string(), options.input);
   lab::require_complete(settings, choice.used);
+  // Reading and the map keep about one core busy.
+  if (!settings.given.contains("estimator.threads")) settings.estimator.threads = std::max(1, options.threads - 1);
   RunFacts facts;
   facts.input = options.input;
   facts.config_file = config.string();
   facts.sensors = choice.used;
+  facts.notes = choice.notes;
   facts.warnings = choice.warnings;
   return Run(options, std::move(settings), std::move(choice), std::move(facts)).all();
 }

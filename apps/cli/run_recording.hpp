@@ -23,6 +23,7 @@ struct RunOptions {
   std::optional<std::filesystem::path> map;                   // out/map.ply by default
   bool with_map = true;
   bool no_deskew = false;
+  int threads = 1;  // more than one: reading and the map have their own. The results are the same
   bool quiet = false;
 };
 

@@ -114,7 +114,7 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
     if (present && is_supported(sensor)) {
       out.used.push_back(sensor);
     } else if (present) {
-      out.warnings.push_back(unsupported(sensor));
+      out.notes.push_back(unsupported(sensor));
     } else {
       const std::vector<std::string> names(topics.begin(), topics.end());
       missing.push_back(fmt::format("no topic {} ({}), nearest is {}", topic, name_of(sensor), lab::nearest(topic, names)));
@@ -130,7 +130,9 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
   }
   if (out.used.size() == 1 && more_configured) {
     std::string why;
-    for (const std::string& text : out.warnings) why += text + "; ";
+    for (const auto& texts : {out.notes, out.warnings}) {
+      for (const std::string& text : texts) why += text + "; ";
+    }
     throw lab::InputError(fmt::format("{}: nothing but the IMU could be used: {}say --sensors imu if that is what you want", input, why));
   }
   return out;

@@ -24,7 +24,8 @@ lab::DropInterval parse_drop(const std::string& text);
 
 struct SensorChoice {
   std::vector<Sensor> used;
-  std::vector<std::string> warnings;  // what could have been used and is not, and why
+  std::vector<std::string> notes;     // what is there and cannot be used yet
+  std::vector<std::string> warnings;  // what is configured and not there
 };
 
 /// The sensors wanted; without a wish those that are configured, supported and in the input. Throws UsageError for a wish that cannot be

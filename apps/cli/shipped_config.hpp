@@ -7,7 +7,8 @@
 
 namespace kilvo::cli {
 
-/// The file that `--config` means, or config/robots/g1.yaml when it is not given. Throws UsageError when the latter is nowhere.
-std::filesystem::path config_file(const std::optional<std::string>& wanted);
+/// The file that `--config` means. When it is not given: config.yaml in an input that is a folder (simulations bring their own), else
+/// robots/g1.yaml. Throws UsageError when that is nowhere.
+std::filesystem::path config_file(const std::optional<std::string>& wanted, const std::string& input = {});
 
 }  // namespace kilvo::cli

@@ -14,8 +14,8 @@ namespace kilvo::cli {
 struct RunFacts {
   std::string input, config_file;
   std::vector<Sensor> sensors;
-  std::vector<std::string> warnings;  // of the choice of sensors
-  std::string failure;                // why the run failed; empty when it did not
+  std::vector<std::string> notes, warnings;  // of the choice of sensors
+  std::string failure;                       // why the run failed; empty when it did not
   double data_seconds = 0, wall_seconds = 0;
   std::size_t map_points = 0;
 };

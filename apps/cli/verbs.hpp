@@ -14,5 +14,6 @@ void add_run(CLI::App& program, Action& chosen);
 void add_info(CLI::App& program, Action& chosen);
 void add_eval(CLI::App& program, Action& chosen);
 void add_config(CLI::App& program, Action& chosen);
+void add_demo(CLI::App& program, Action& chosen);
 
 }  // namespace kilvo::cli

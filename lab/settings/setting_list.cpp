@@ -54,9 +54,9 @@ std::vector<Setting> list_settings(Settings& s) {
   std::vector<Setting> out;
   Lister list(out);
   const auto topic = [&s](Sensor sensor) { return &s.topics[static_cast<std::size_t>(sensor)]; };
-  const auto begins = [](std::string_view start) {
-    return [start](std::string_view name) { return name.substr(0, start.size()) == start; };
-  };
+  // The process noise stands in one struct, but each density belongs to the sensor whose section a user would look in.
+  const auto of_feet = [](std::string_view name) { return name.starts_with("foot_"); };
+  const auto of_camera = [](std::string_view name) { return name.starts_with("exposure_"); };
   Robot& robot = s.robot;
   ProcessNoise& noise = s.estimator.noise;
 
@@ -70,14 +70,13 @@ std::vector<Setting> list_settings(Settings& s) {
   list.own("imu.T_link_imu.link", &robot.imu.link, "-", "link of the URDF that the IMU is fixed to");
   list.pose("imu.T_link_imu", robot.imu.T_link_imu, "position of the IMU in that link", "rotation from the IMU to that link, row by row");
   list.fields("imu", robot.imu);
-  list.fields("imu", noise, begins("gyro_"));
-  list.fields("imu", noise, begins("accel_"));
+  list.fields("imu", noise, [&](std::string_view name) { return !of_feet(name) && !of_camera(name); });
 
   list.own("legs.topic", topic(Sensor::legs), "-", "topic of the joint encoders, or of the feet");
   list.pose("legs.T_imu_feet", robot.legs.T_imu_feet, "two-feet message: its frame's origin in the IMU frame",
             "two-feet message: rotation from its frame to the IMU, row by row");
   list.fields("legs", robot.legs);
-  list.fields("legs", noise, begins("foot_"));
+  list.fields("legs", noise, of_feet);
 
   list.own("lidar.topic", topic(Sensor::lidar), "-", "topic of the LiDAR");
   list.pose("lidar.T_imu_lidar", robot.lidar.T_imu_lidar, "position of the LiDAR in the IMU frame",
@@ -89,7 +88,7 @@ std::vector<Setting> list_settings(Settings& s) {
   list.pose("camera.T_imu_camera", robot.camera.T_imu_camera, "position of the camera in the IMU frame",
             "rotation from the camera's optical frame (z forward, x right, y down) to the IMU, row by row");
   list.fields("camera", robot.camera);
-  list.fields("camera", noise, begins("exposure_"));
+  list.fields("camera", noise, of_camera);
 
   list.fields("map", s.estimator.map);
   list.fields("map", s.mapping);

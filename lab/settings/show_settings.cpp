@@ -64,6 +64,18 @@ std::string comment_of(const Setting& setting) {
 
 bool has_value(const Settings& settings, const Setting& setting) { return setting.has_default || settings.given.contains(setting.key); }
 
+constexpr const char* markdown_head = R"(# Settings
+
+Made by `kilvo config show --markdown > docs/parameters.md` from the structs that hold the settings; a test keeps it up to date.
+
+A configuration file is YAML, one map per section below; a dot in a name is one level deeper (`lidar.T_imu_lidar.p`). What has no default
+describes the robot and must be in the file when the sensor it belongs to is used; the rest is tuning and rarely needed. One setting is
+changed on the command line by `--set lidar.voxel_size=0.2`, where the value is YAML too. `kilvo config show FILE` prints all settings as
+they would be used, `kilvo config check FILE` finds mistakes: an unknown name, a wrong type, a number out of range, a rotation that is
+not one (`R^T R` must be the identity within 0.001), a link or joint that the URDF does not have are errors that name file, line, setting
+and the nearest valid name. Files for several robots are in `config/robots`, for public recordings in `config/datasets`.
+)";
+
 }  // namespace
 
 std::string settings_yaml(const Settings& settings) {
@@ -80,7 +92,11 @@ std::string settings_yaml(const Settings& settings) {
         const bool known = has_value(settings, setting);
         const std::string line =
             fmt::format("{}{}{}: {}", indent(depth), known ? "" : "# ", setting.name(), known ? value_text(setting.value) : "(not set)");
-        out += fmt::format("{:<40}  # {}\n", line, comment_of(setting));
+        // A long value has its comment above, so that it can be seen.
+        constexpr std::size_t longest = 60;
+        const std::string comment = comment_of(setting);
+        out += line.size() > longest ? fmt::format("{}# {}\n{}\n", indent(depth), comment, line)
+                                     : fmt::format("{:<40}  # {}\n", line, comment);
       },
       [](std::size_t) {});
   return out;
@@ -111,7 +127,7 @@ std::string settings_json(const Settings& settings) {
 std::string settings_markdown() {
   Settings defaults;
   const std::vector<Setting> list = list_settings(defaults);
-  std::string out, section;
+  std::string section, out = markdown_head;
   for (const Setting& s : list) {
     const std::string its_section = s.key.substr(0, s.key.find('.'));
     if (its_section != section) {

@@ -1,0 +1,35 @@
+// Keeps the map up to date on a thread of its own, so that the estimator need not wait for it.
+#pragma once
+
+#include <exception>
+#include <thread>
+#include <vector>
+
+#include "apps/cli/bounded_queue.hpp"
+#include "lab/mapping/map_builder.hpp"
+
+namespace kilvo::cli {
+
+class MapKeeper {
+ public:
+  /// Without a thread of its own, `threaded` false, add() does the work itself. The map is the same.
+  MapKeeper(const lab::MappingConfig& config, bool threaded);
+  ~MapKeeper();
+  MapKeeper(const MapKeeper&) = delete;
+  MapKeeper& operator=(const MapKeeper&) = delete;
+
+  void add(std::vector<Eigen::Vector4f> points_W);
+  /// Waits until everything is in; nothing may be added afterwards.
+  const lab::MapBuilder& finish();
+
+ private:
+  void add_all();
+  void join();
+
+  lab::MapBuilder map_;
+  BoundedQueue<std::vector<Eigen::Vector4f>> queue_;
+  std::exception_ptr error_;  // of the thread; read after it has ended
+  std::thread thread_;
+};
+
+}  // namespace kilvo::cli

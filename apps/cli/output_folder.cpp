@@ -1,0 +1,28 @@
+#include "apps/cli/output_folder.hpp"
+
+#include <fmt/core.h>
+#include <system_error>
+
+#include "apps/cli/csv_file.hpp"
+#include "lab/mapping/output_error.hpp"
+
+namespace kilvo::cli {
+
+namespace fs = std::filesystem;
+
+void write_text_file(const fs::path& path, std::string_view text) {
+  CsvFile file(path, text);
+  file.close();
+}
+
+void prepare_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw lab::OutputError(fmt::format("{}: cannot be created: {}", folder.string(), error.message()));
+  if (!fs::is_directory(folder, error)) throw lab::OutputError(fmt::format("{}: is not a folder", folder.string()));
+  const fs::path probe = folder / ".kilvo_can_write_here";
+  write_text_file(probe, "");
+  fs::remove(probe, error);
+}
+
+}  // namespace kilvo::cli

@@ -1,0 +1,44 @@
+// Reads and decodes on a thread of its own while the estimator works. What comes out is what the source gives, in its order.
+#pragma once
+
+#include <exception>
+#include <thread>
+#include <vector>
+
+#include "apps/cli/bounded_queue.hpp"
+#include "lab/recordings/recording_source.hpp"
+
+namespace kilvo::cli {
+
+class ReadAhead {
+ public:
+  /// Without a thread of its own, `threaded` false, it just asks the source. The source must not be touched before stop().
+  ReadAhead(lab::RecordingSource& source, bool threaded);
+  ~ReadAhead() { stop(); }
+  ReadAhead(const ReadAhead&) = delete;
+  ReadAhead& operator=(const ReadAhead&) = delete;
+
+  std::optional<Measurement> next();
+  /// 0 to 1.
+  double progress() const { return progress_; }
+  /// No more is wanted: from here on the source is the caller's.
+  void stop();
+
+ private:
+  // Handed over together, so that a thousand small messages do not cost a thousand locks.
+  struct Batch {
+    std::vector<Measurement> measurements;
+    double progress = 0;
+  };
+  void read_all();
+
+  lab::RecordingSource& source_;
+  BoundedQueue<Batch> queue_;
+  Batch batch_;
+  std::size_t taken_ = 0;  // of batch_
+  double progress_ = 0;
+  std::exception_ptr error_;  // of the thread; read after it has closed the queue
+  std::thread thread_;
+};
+
+}  // namespace kilvo::cli
