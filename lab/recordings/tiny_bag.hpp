@@ -70,7 +70,9 @@ struct KeptMessage {
   Time time{};
   std::vector<std::uint8_t> bytes;
 
-  auto operator<=>(const KeptMessage&) const = default;
+  bool operator<(const KeptMessage& other) const {
+    return std::tie(connection, time, bytes) < std::tie(other.connection, other.time, other.bytes);
+  }
 };
 
 inline std::vector<KeptMessage> read_all(Rosbag1Reader& reader) {
