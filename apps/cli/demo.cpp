@@ -64,7 +64,7 @@ void tell(const fs::path& folder, const fs::path& results, const lab::Evaluation
   fmt::print("  position error      {:.1f} mm rms, {:.1f} mm at most\n", 1e3 * e.ate_rmse_m, 1e3 * e.ate_max_m);
   fmt::print("  orientation error   {:.3f} degrees rms\n", e.rotation_rmse_deg);
   fmt::print("  drift from start to end  {:.1f} mm\n", 1e3 * e.e2e_m);
-  fmt::print("  {}\n", judged.diverged ? "That is NOT as it should be." : "That is as it should be.");
+  fmt::print("  {}\n", judged.diverged ? "This is NOT as it should be." : "As it should be.");
   fmt::print("Look at:\n");
   fmt::print("  {}  the map, for MeshLab or CloudCompare\n", (results / "map.ply").string());
   fmt::print("  {}  the trajectory, t x y z qx qy qz qw\n", (results / "odometry.tum").string());

@@ -15,7 +15,8 @@ namespace {
 
 struct RunWords {
   RunOptions options;
-  std::string out, sensors, map, config;
+  std::string out, map, config;
+  std::optional<std::string> sensors;
   std::vector<std::string> drops;
   bool no_map = false;
   int threads = 0;  // 0: as many as there are cores
@@ -25,7 +26,7 @@ int run(RunWords words) {
   RunOptions& options = words.options;
   options.out = words.out;
   if (!words.config.empty()) options.config = words.config;
-  if (!words.sensors.empty()) options.sensors = parse_sensors(words.sensors);
+  if (words.sensors) options.sensors = parse_sensors(*words.sensors);
   for (const std::string& text : words.drops) options.drops.push_back(parse_drop(text));
   if (words.no_map && !words.map.empty()) throw UsageError("--map and --no-map exclude each other");
   if (!words.map.empty()) options.map = words.map;

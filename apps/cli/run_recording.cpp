@@ -62,8 +62,9 @@ void tell_start(const RunFacts& facts, const lab::RecordingSource& source, bool 
 /// Everything between the first message and the last file.
 class Run {
  public:
-  Run(const RunOptions& options, lab::Settings settings, SensorChoice choice, RunFacts facts)
+  Run(const RunOptions& options, InterruptWatch& interrupt, lab::Settings settings, const SensorChoice& choice, RunFacts facts)
       : options_(options),
+        interrupt_(interrupt),
         settings_(std::move(settings)),
         facts_(std::move(facts)),
         source_(options.input, recording_options(options, settings_, choice.used)),
@@ -93,7 +94,6 @@ class Run {
  private:
   // True when the user stopped it.
   bool replay() {
-    InterruptWatch interrupt;
     ReadAhead input(source_, options_.threads > 1);
     bool interrupted = false;
     while (auto measurement = input.next()) {
@@ -101,7 +101,7 @@ class Run {
       if (!first_) first_ = last_;
       keep(estimator_.push(*std::move(measurement)));
       progress_.update(input.progress(), [this] { return progress_note(); });
-      interrupted = interrupt.requested();
+      interrupted = interrupt_.requested();
       if (interrupted) break;
     }
     input.stop();
@@ -146,6 +146,7 @@ class Run {
   }
 
   const RunOptions& options_;
+  InterruptWatch& interrupt_;
   lab::Settings settings_;
   RunFacts facts_;
   lab::RecordingSource source_;
@@ -163,6 +164,7 @@ int run_recording(const RunOptions& options) {
   const std::filesystem::path config = config_file(options.config, options.input);
   lab::Settings settings = lab::load_settings(config, options.overrides);
   prepare_folder(options.out);
+  if (options.map) prepare_folder(std::filesystem::absolute(*options.map).parent_path());
   SensorChoice choice = choose_sensors(options.sensors, settings, config.string(), options.input);
   lab::require_complete(settings, choice.used);
   // Reading and the map keep about one core busy.
@@ -173,7 +175,8 @@ int run_recording(const RunOptions& options) {
   facts.sensors = choice.used;
   facts.notes = choice.notes;
   facts.warnings = choice.warnings;
-  return Run(options, std::move(settings), std::move(choice), std::move(facts)).all();
+  InterruptWatch interrupt;  // before any thread, so that none of them takes the signal
+  return Run(options, interrupt, std::move(settings), choice, std::move(facts)).all();
 }
 
 }  // namespace kilvo::cli

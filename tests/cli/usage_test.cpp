@@ -1,0 +1,165 @@
+// Words on the command line, and the verbs that do not run anything.
+#include "tests/cli/story.hpp"
+
+namespace kilvo::stories {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+void expect_error(const std::vector<std::string>& words, int code, const std::string& text) {
+  const Finished f = kilvo(words);
+  EXPECT_EQ(f.code, code) << f.err;
+  EXPECT_THAT(f.err, HasSubstr(text));
+  EXPECT_THAT(f.err, HasSubstr("kilvo: error: "));
+  EXPECT_EQ(f.out, "");
+}
+
+TEST(Usage, MistypedWordsNameTheNearest) {
+  expect_error({"rnu", "x.bag"}, 2, "no verb 'rnu', nearest is 'run'");
+  expect_error({"config", "shwo"}, 2, "no verb 'shwo', nearest is 'show'");
+  expect_error({"run", "x.bag", "--sensor", "imu"}, 2, "run: no option '--sensor', nearest is '--sensors'");
+  expect_error({"--verison"}, 2, "no option '--verison', nearest is '--version'");
+  expect_error({"run", "x.bag", "--out", "/tmp/x", "--sensors", "imu,lydar"}, 2, "no sensor 'lydar', nearest is 'lidar'");
+  expect_error({"run", "x.bag", "--out", "/tmp/x", "--sensors", ""}, 2, "no sensor ''");
+  expect_error({"run", "x.bag", "--out", "/tmp/x", "--sensors", "imu,"}, 2, "no sensor ''");
+  expect_error({"eval", "a", "b", "--align", "sim3"}, 2, "nearest is 'se3'");
+}
+
+TEST(Usage, MissingOrImpossibleWordsAreSaid) {
+  expect_error({}, 2, "say a verb");
+  expect_error({"run"}, 2, "INPUT");
+  expect_error({"run", "x.bag"}, 2, "--out");
+  expect_error({"config"}, 2, "subcommand");
+  expect_error({"run", "x.bag", "--out", "/tmp/x", "--threads", "0"}, 2, "--threads");
+  expect_error({"run", "x.bag", "--out", "/tmp/x", "--threads", "many"}, 2, "--threads");
+  expect_error({"run", "x.bag", "--out", "/tmp/x", "--start", "-1"}, 2, "--start");
+  expect_error({"run", "x.bag", "--out", "/tmp/x", "--start", "nan"}, 2, "--start");
+  expect_error({"run", "x.bag", "--out", "/tmp/x", "--duration", "0"}, 2, "--duration");
+  expect_error({"run", "x.bag", "--out", "/tmp/x", "--map", "m.ply", "--no-map"}, 2, "exclude each other");
+  for (const char* drop : {"lidar", "lidar:", "lidar:5", "lidar:6-5", "lidar:a-b", "lidar:1-2x", ":1-2", "lidar:nan-2"}) {
+    expect_error({"run", "x.bag", "--out", "/tmp/x", "--drop", drop}, 2, "");
+  }
+}
+
+TEST(Usage, SensorsThatCannotBeUsedAreRefused) {
+  const TemporaryFolder folder;
+  expect_error({"run", "x.bag", "--out", folder / "out", "--sensors", "lidar"}, 2, "the imu is needed");
+  expect_error({"run", "x.bag", "--out", folder / "out", "--sensors", "imu,legs"}, 2, "the sensor 'legs' is not supported by this version");
+  expect_error({"run", "x.bag", "--out", folder / "out", "--sensors", "camera,imu,lidar"}, 2, "the sensor 'camera' is not supported");
+  write_text(folder / "robot.yaml", "imu: {topic: /imu}");
+  expect_error({"run", "x.bag", "--out", folder / "out", "--config", folder / "robot.yaml", "--sensors", "imu,lidar"}, 2,
+               "lidar.topic is missing");
+}
+
+TEST(Usage, HelpAndVersionGoToStdout) {
+  const Finished version = kilvo({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_EQ(version.out, "kilvo 0.1.0\n");
+  const Finished help = kilvo({"--help"});
+  EXPECT_EQ(help.code, 0);
+  for (const char* verb : {"run", "info", "eval", "config", "demo"}) {
+    EXPECT_THAT(help.out, HasSubstr(verb));
+    const Finished its_help = kilvo({verb, "--help"});
+    EXPECT_EQ(its_help.code, 0) << verb;
+    EXPECT_THAT(its_help.out, AllOf(HasSubstr(verb), HasSubstr("--help")));
+    EXPECT_EQ(its_help.err, "");
+  }
+  EXPECT_THAT(kilvo({"run", "--help"}).out, AllOf(HasSubstr("--no-deskew"), HasSubstr("--drop"), HasSubstr("KEY=VALUE")));
+}
+
+class Verbs : public Story {};
+
+TEST_F(Verbs, EvalComparesTrajectories) {
+  const SmallWalk walk = small_walk(3);
+  lab::write_tum(folder / "gt.tum", walk.truth);
+  const Finished text = kilvo({"eval", folder / "gt.tum", folder / "gt.tum"});
+  EXPECT_EQ(text.code, 0) << text.err;
+  EXPECT_THAT(text.out, HasSubstr("ATE           rmse 0.00 mm"));
+  for (const char* align : {"se3", "yaw", "first"}) {
+    const Finished f = kilvo({"eval", folder / "gt.tum", folder / "gt.tum", "--align", align, "--json"});
+    const auto json = nlohmann::json::parse(f.out);
+    EXPECT_EQ(json["align"], align);
+    EXPECT_LT(json["ate_rmse_m"], 1e-8);
+    EXPECT_LT(json["e2e_m"], 1e-8);
+  }
+}
+
+TEST_F(Verbs, EvalRefusesFilesItCannotCompare) {
+  const SmallWalk walk = small_walk(1);
+  lab::write_tum(folder / "gt.tum", walk.truth);
+  std::vector<lab::StampedPose> later = walk.truth;
+  for (lab::StampedPose& pose : later) pose.t += std::chrono::seconds(100);
+  lab::write_tum(folder / "later.tum", later);
+  write_text(folder / "bad.tum", "# t x y z\n1 2 3\n");
+  expect_error({"eval", folder / "missing.tum", folder / "gt.tum"}, 3, "missing.tum");
+  expect_error({"eval", folder / "bad.tum", folder / "gt.tum"}, 3, "bad.tum:2");
+  expect_error({"eval", folder / "later.tum", folder / "gt.tum"}, 3, "");
+}
+
+TEST_F(Verbs, InfoNamesWhatItFinds) {
+  record(small_walk(1).measurements);
+  const Finished f = kilvo({"info", recording(), "--config", config()});
+  EXPECT_EQ(f.code, 0) << f.err;
+  EXPECT_THAT(f.out, AllOf(HasSubstr("/imu "), HasSubstr("sensor_msgs/Imu"), HasSubstr("/points "), HasSubstr("sensor_msgs/PointCloud2"),
+                           HasSubstr("timestamp (float64): nanoseconds, absolute"), HasSubstr("200.")));
+  expect_error({"info", folder / "missing.bag"}, 3, "missing.bag");
+}
+
+TEST_F(Verbs, ConfigShowPrintsWhatConfigCheckFindsGood) {
+  const Finished shown = kilvo({"config", "show", "--set", "lidar.voxel_size=0.125"});
+  ASSERT_EQ(shown.code, 0) << shown.err;
+  EXPECT_THAT(shown.out, HasSubstr("voxel_size: 0.125"));
+  write_text(folder / "shown.yaml", shown.out);
+  const Finished checked = kilvo({"config", "check", folder / "shown.yaml"});
+  EXPECT_EQ(checked.code, 0) << checked.err;
+  EXPECT_THAT(checked.out, AllOf(HasSubstr("good"), HasSubstr("lidar (/livox/lidar)"), HasSubstr("camera")));
+  const Finished again = kilvo({"config", "show", folder / "shown.yaml"});
+  EXPECT_THAT(again.out, HasSubstr("voxel_size: 0.125"));
+}
+
+TEST_F(Verbs, ConfigCheckFindsMistakes) {
+  EXPECT_EQ(kilvo({"config", "check", config()}).code, 0);
+  write_text(config(), small_config() + "map: {resolution: 0}\n");
+  expect_error({"config", "check", config()}, 2, config() + ":8: map.resolution: must be 0.001 to 100, not 0");
+  write_text(config(), "lidar: {topic: /points}\n");
+  expect_error({"config", "check", config()}, 2, "imu.topic is missing");
+  expect_error({"config", "check", folder / "missing.yaml"}, 2, "missing.yaml");
+}
+
+TEST_F(Verbs, EveryShippedRobotIsGood) {
+  for (const char* robot : {"g1", "g1_cam_r", "g1_tilt", "g1_tilt_cam_r"}) {
+    EXPECT_EQ(kilvo({"config", "check", KILVO_SOURCE_DIR "/config/robots/" + std::string(robot) + ".yaml"}).code, 0) << robot;
+  }
+}
+
+TEST(Documents, TheListOfSettingsIsUpToDate) {
+  EXPECT_TRUE(kilvo({"config", "show", "--markdown"}).out == read_text(KILVO_SOURCE_DIR "/docs/parameters.md"))
+      << "run: kilvo config show --markdown > docs/parameters.md";
+}
+
+TEST_F(Verbs, TheProgramFindsItsConfigurationsWhereverItIsPut) {
+  fs::create_directories(folder / "bin");
+  fs::create_directories(folder / "share/kilvo");
+  fs::copy(KILVO_PROGRAM, folder / "bin/kilvo");
+  fs::copy(KILVO_SOURCE_DIR "/config", folder / "share/kilvo/config", fs::copy_options::recursive);
+  const Finished f = run_program(folder / "bin/kilvo", {"config", "show"});
+  EXPECT_EQ(f.code, 0) << f.err;
+  EXPECT_THAT(f.out, StartsWith("# " + (folder / "share/kilvo/config/robots/g1.yaml")));
+  EXPECT_THAT(f.out, HasSubstr(folder / "share/kilvo/config/robots/g1_12dof.urdf"));
+}
+
+TEST_F(Verbs, TheDemoGoesFromNothingToAMap) {
+  const Finished f = kilvo({"demo", "--out", folder / "demo", "--duration", "4", "--quiet"});
+  EXPECT_EQ(f.code, 0) << f.err;
+  EXPECT_THAT(f.out, AllOf(HasSubstr("position error"), HasSubstr("As it should be."), HasSubstr("map.ply")));
+  for (const char* file : {"recording.bag", "gt.tum", "config.yaml", "results/map.ply", "results/summary.json"}) {
+    EXPECT_TRUE(fs::exists(folder / ("demo/" + std::string(file)))) << file;
+  }
+  expect_error({"demo", "--duration", "1"}, 2, "--duration");
+}
+
+}  // namespace
+}  // namespace kilvo::stories
