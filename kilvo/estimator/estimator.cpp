@@ -32,6 +32,17 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+// What no sensor measures; nullptr: nothing wrong.
+const char* fault_of(const Measurement& m) {
+  constexpr double absurd_gyro = 300, absurd_accel = 5000;  // rad/s, m/s^2 (or g): beyond any IMU's range
+  if (const auto* imu = std::get_if<ImuSample>(&m)) {
+    if (!imu->gyro.allFinite() || !imu->accel.allFinite()) return "not finite";
+    if (imu->gyro.norm() > absurd_gyro || imu->accel.norm() > absurd_accel) return "absurd value";
+  }
+  if (const auto* scan = std::get_if<LidarScan>(&m); scan != nullptr && scan->points.empty()) return "empty";
+  return nullptr;
+}
+
 std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE3& T_WI) {
   std::vector<PointXYZI> out(points_I.size());
   const Eigen::Matrix3f R = T_WI.R.matrix().cast<float>();
@@ -66,18 +77,15 @@ std::vector<Output> Estimator::push(Measurement m) {
     drop(s, "not used");
     return out;
   }
-  if (const auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && !(imu->gyro.allFinite() && imu->accel.allFinite())) {
-    drop(s, "not finite");
-    return out;
-  }
-  if (const auto* scan = std::get_if<LidarScan>(&m); scan != nullptr && scan->points.empty()) {
-    drop(s, "empty");
+  if (const char* fault = fault_of(m)) {
+    drop(s, fault);
     return out;
   }
   if (const auto refused = timeline_.push(std::move(m))) {
     drop(s, *refused);
     return out;
   }
+  for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, "time jump");
   while (auto next = timeline_.pop()) handle(*next, out);
   return out;
 }
@@ -85,6 +93,7 @@ std::vector<Output> Estimator::push(Measurement m) {
 std::vector<Output> Estimator::finish() {
   std::vector<Output> out;
   timeline_.end();
+  for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, "time jump");
   while (auto next = timeline_.pop()) handle(*next, out);
   // A scan that ends between the last IMU sample and where the next would have been: the last sample is held.
   const Duration period = from_seconds(1.5 / robot_.imu.rate);
@@ -194,7 +203,15 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   }
   propagate(*estimate_, s.t);
   keep_finite();
+  // Without sweeps nothing older than this will be replayed.
+  constexpr Duration longest_replay = std::chrono::seconds(2);
+  if (s.t - anchor_.t > longest_replay && pending_.empty()) settle(*estimate_);
   out.push_back(output_now());
+}
+
+void Estimator::settle(const Estimate& e) {
+  anchor_ = e;
+  while (imu_.size() > 2 && imu_[1].t <= anchor_.t) imu_.pop_front();
 }
 
 bool Estimator::keep_finite() {
@@ -253,8 +270,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
     map_.insert(to_world(clusters, T_WI, p_IL, config_.lidar), epoch);
     map_.forget(estimate_->x.p);
     degenerate_ = model.report().degeneracy.weak_count > 0;
-    anchor_ = *estimate_;
-    while (imu_.size() > 2 && imu_[1].t <= anchor_.t) imu_.pop_front();
+    settle(*estimate_);
   }
   stages.map_us = watch.lap_us();
 

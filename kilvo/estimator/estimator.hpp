@@ -45,6 +45,7 @@ class Estimator {
   void propagate(Estimate& e, Time until);
   void process(const LidarScan& scan, Time end, std::vector<Output>& out);
   void bound_pending();
+  void settle(const Estimate& e);  // nothing before it will be replayed
   bool keep_finite();
   void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
   Output output_now() const;

@@ -18,8 +18,36 @@ Time begin_of(const LidarScan& scan) {
   return scan.t + Duration(first);
 }
 
+void Timeline::give_up_suspects() {
+  for (const Measurement& m : suspects_) jumped_.push_back(sensor_of(m));
+  suspects_.clear();
+}
+
+void Timeline::end() {
+  give_up_suspects();
+  ended_ = true;
+}
+
 std::optional<std::string> Timeline::push(Measurement m) {
-  const Time key = completion_of(m), stamp = stamp_of(m);
+  constexpr Duration jump = std::chrono::seconds(1);
+  constexpr std::size_t witnesses = 10;
+  const Time key = completion_of(m);
+  if (!newest_of_all_ || key - *newest_of_all_ <= jump) {
+    give_up_suspects();
+    return admit(std::move(m), key);
+  }
+  suspects_.push_back(std::move(m));
+  if (suspects_.size() < witnesses) return std::nullopt;
+  for (Measurement& suspect : std::exchange(suspects_, {})) {
+    const Time suspect_key = completion_of(suspect);
+    const Sensor sensor = sensor_of(suspect);
+    if (admit(std::move(suspect), suspect_key)) jumped_.push_back(sensor);
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> Timeline::admit(Measurement m, Time key) {
+  const Time stamp = stamp_of(m);
   const auto s = static_cast<std::size_t>(sensor_of(m));
   if (stamp_[s] == stamp) return "duplicate";
   if (released_ && key < *released_) return "late";

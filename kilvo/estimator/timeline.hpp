@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "kilvo/sensors/measurement.hpp"
 
@@ -23,23 +24,31 @@ class Timeline {
  public:
   Timeline(std::array<bool, sensor_count> expected, Duration max_wait) : expected_(expected), max_wait_(max_wait) {}
 
-  /// Takes the measurement, or says why not ("late", "duplicate").
+  /// Takes the measurement, or says why not ("late", "duplicate"). One that is over a second ahead of all others is kept apart: if the
+  /// next ones are there as well, time has really passed; if not, its clock was wrong (take_jumped).
   std::optional<std::string> push(Measurement m);
+
+  /// Sensors of the measurements that turned out to be ahead by mistake, since the last call.
+  std::vector<Sensor> take_jumped() { return std::exchange(jumped_, {}); }
 
   /// The next measurement in order, if it need not wait.
   std::optional<Measurement> pop();
 
   /// From now on nothing waits: the recording has ended.
-  void end() { ended_ = true; }
+  void end();
 
  private:
   bool may_go(Time key) const;
+  void give_up_suspects();
+  std::optional<std::string> admit(Measurement m, Time key);
 
   std::array<bool, sensor_count> expected_;
   std::array<std::optional<Time>, sensor_count> newest_;
   std::array<std::optional<Time>, sensor_count> stamp_;  // of the newest
   std::optional<Time> released_, newest_of_all_;
   std::map<std::pair<Time, std::uint64_t>, Measurement> waiting_;  // by completion, then by arrival
+  std::vector<Measurement> suspects_;                              // ahead of all others
+  std::vector<Sensor> jumped_;
   std::uint64_t sequence_ = 0;
   Duration max_wait_;
   bool ended_ = false;
