@@ -70,6 +70,15 @@ TemporaryFolder::~TemporaryFolder() {
   fs::remove_all(path_, error);
 }
 
+void wait_for_content(const fs::path& path) {
+  constexpr useconds_t pause_us = 10000;
+  for (int i = 0; i < 1000; ++i) {
+    std::error_code error;
+    if (fs::file_size(path, error) > 0 && !error) return;
+    ::usleep(pause_us);
+  }
+}
+
 std::string read_text(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};

@@ -46,6 +46,9 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
+/// Waits, at most ten seconds, until there is something in the file.
+void wait_for_content(const std::filesystem::path& path);
+
 std::string read_text(const std::filesystem::path& path);
 void write_text(const std::filesystem::path& path, const std::string& text);
 

@@ -1,8 +1,6 @@
 // kilvo run, when all is well, and what its options do.
-#include <chrono>
 #include <signal.h>
 #include <sstream>
-#include <thread>
 
 #include "lab/mapping/ply.hpp"
 #include "tests/cli/story.hpp"
@@ -169,10 +167,7 @@ TEST_F(Run, CtrlCWritesWhatIsThere) {
     long_rest.push_back(ImuSample{time_from_ns(1'700'000'000'000'000'000 + i * 5'000'000L), {0, 0, 0}, {0, 0, 9.8}});
   record(long_rest);
   Started program({"run", recording(), "--config", config(), "--out", out(), "--sensors", "imu"});
-  std::error_code error;
-  for (int i = 0; i < 1000 && !(fs::file_size(folder / "out/odometry.tum", error) > 0 && !error); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
+  wait_for_content(folder / "out/odometry.tum");
   program.send(SIGINT);
   const Finished f = program.wait();
   EXPECT_EQ(f.code, 1) << f.err;
