@@ -80,7 +80,7 @@ void VoxelMap::refit_if_due(Node& node, const Eigen::Vector3d& origin) {
 void VoxelMap::insert(std::span<const PointGroup> groups, std::uint32_t epoch) {
   for (const PointGroup& g : groups) {
     constexpr double farthest = 1e5;  // m; what is beyond is no place a robot walks to, and would leave the key's bits
-    if (g.count > 0 && g.mean.cwiseAbs().maxCoeff() < farthest) insert_one(g, epoch);
+    if (g.count > 0 && (g.mean.array().abs() < farthest).all()) insert_one(g, epoch);
   }
 }
 

@@ -1,0 +1,229 @@
+#include "kilvo/map/voxel_map.hpp"
+
+#include <algorithm>
+#include <gtest/gtest.h>
+#include <set>
+
+#include "tests/helpers/random.hpp"
+#include "tests/helpers/surface_groups.hpp"
+
+namespace kilvo {
+namespace {
+
+const Eigen::Vector3d x_axis = Eigen::Vector3d::UnitX(), y_axis = Eigen::Vector3d::UnitY(), z_axis = Eigen::Vector3d::UnitZ();
+
+constexpr double sigma = 0.002, spacing = 0.03, leaf = 0.25;
+
+VoxelMap map_of(const std::vector<Eigen::Vector3d>& points, const MapConfig& config = {}) {
+  VoxelMap map(config);
+  map.insert(test::groups_of(points, leaf, sigma), 7);
+  return map;
+}
+
+std::vector<Eigen::Vector3d> joined(std::vector<Eigen::Vector3d> a, const std::vector<Eigen::Vector3d>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+int planes_over(const VoxelMap& map, const Eigen::Vector3d& x) {
+  int count = 0;
+  map.visit_planes(x, [&count](const VoxelMap::Match&) {
+    ++count;
+    return false;
+  });
+  return count;
+}
+
+TEST(VoxelMap, AFloorIsOnePlanePerRootVoxelOnBothSidesOfZero) {
+  const VoxelMap map = map_of(test::points_on({-2, -2, -0.3}, 4 * x_axis, 4 * y_axis, spacing));
+  std::set<const Plane*> planes;
+  for (double x = -1.95; x < 2; x += 0.1) {
+    for (double y = -1.95; y < 2; y += 0.1) {
+      const Plane* plane = map.plane_at({x, y, -0.3});
+      ASSERT_NE(plane, nullptr) << x << " " << y;
+      planes.insert(plane);
+      EXPECT_LT(std::abs(plane->distance({x, y, -0.3})), 1e-6);
+      EXPECT_NEAR(std::abs(plane->normal.z()), 1, 1e-6);
+      EXPECT_LT((plane->centre - Eigen::Vector3d(std::floor(x) + 0.5, std::floor(y) + 0.5, -0.3)).norm(), 0.15);  // as of the last fit
+    }
+  }
+  EXPECT_EQ(planes.size(), 16U);
+  EXPECT_EQ(map.plane_at({0.5, 0.5, 0.5}), nullptr);
+  EXPECT_EQ(map.plane_at({2.5, 0.5, -0.3}), nullptr);
+}
+
+TEST(VoxelMap, AVoxelHoldsItsLowerBorderAndNotItsUpper) {
+  const VoxelMap map = map_of(test::points_on({0, 0, 0.5}, x_axis, y_axis, spacing));
+  EXPECT_NE(map.plane_at({0, 0, 0.5}), nullptr);
+  EXPECT_NE(map.plane_at({0.999999, 0, 0.5}), nullptr);
+  EXPECT_EQ(map.plane_at({1, 0, 0.5}), nullptr);
+  EXPECT_EQ(map.plane_at({-1e-12, 0, 0.5}), nullptr);
+}
+
+TEST(VoxelMap, AtAnEdgeOfTwoWallsBothAreFound) {
+  // Floor at z = 0.1 and wall at x = 0.1 meet within one root voxel.
+  const auto points =
+      joined(test::points_on({0.1, 0, 0.1}, 0.9 * x_axis, y_axis, spacing), test::points_on({0.1, 0, 0.1}, 0.9 * z_axis, y_axis, spacing));
+  VoxelMap map = map_of(points);
+  map.insert(test::groups_of(points, leaf, sigma), 7);  // seen twice: what the first points seemed to be is no plane any more
+  for (double away = 0.16; away < 0.9; away += 0.05) {
+    for (double y = 0.1; y < 1; y += 0.2) {
+      const Plane* floor = map.plane_at({0.1 + away, y, 0.1});
+      const Plane* wall = map.plane_at({0.1, y, 0.1 + away});
+      ASSERT_NE(floor, nullptr) << away;
+      ASSERT_NE(wall, nullptr) << away;
+      EXPECT_NEAR(std::abs(floor->normal.z()), 1, 1e-4) << away;
+      EXPECT_NEAR(std::abs(wall->normal.x()), 1, 1e-4) << away;
+    }
+  }
+}
+
+TEST(VoxelMap, AMatchTellsItsPlaneItsNodeAndItsEpoch) {
+  VoxelMap map = map_of(test::points_on({0, 0, 0.5}, x_axis, y_axis, spacing));
+  map.insert(test::groups_of(test::points_on({1, 0, 0.5}, x_axis, y_axis, spacing), leaf, sigma), 9);
+  map.insert(test::groups_of(test::points_on({0, 0, 0.5}, x_axis, y_axis, spacing), leaf, sigma), 11);  // seen again: still 7
+  const auto first_at = [&map](const Eigen::Vector3d& x) {
+    VoxelMap::Match found;
+    map.visit_planes(x, [&found](const VoxelMap::Match& m) {
+      found = m;
+      return true;
+    });
+    return found;
+  };
+  EXPECT_EQ(first_at({0.2, 0.3, 0.5}).epoch, 7U);
+  EXPECT_EQ(first_at({1.2, 0.3, 0.5}).epoch, 9U);
+  EXPECT_EQ(first_at({0.2, 0.3, 0.5}).node, first_at({0.8, 0.9, 0.6}).node);
+  EXPECT_NE(first_at({0.2, 0.3, 0.5}).node, first_at({1.8, 0.9, 0.6}).node);
+  EXPECT_LT(first_at({1.2, 0.3, 0.5}).node, map.node_capacity());
+}
+
+TEST(VoxelMap, TheOrderOfInsertionDoesNotChangeThePlanes) {
+  test::Random random(1);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Eigen::Matrix3d R = random.rotation().matrix();
+    // Ten points per group and fifteen groups: the last fit (refit_growth) sees them all.
+    std::vector<PointGroup> groups;
+    for (int i = 0; i < 15; ++i) {
+      PointGroup g;
+      g.mean = Eigen::Vector3d(0.5, 0.5, 0.5) + random.uniform(-0.28, 0.28) * R.col(0) + random.uniform(-0.28, 0.28) * R.col(1);
+      g.scatter = 10 * 0.02 * 0.02 * (Eigen::Matrix3d::Identity() - R.col(2) * R.col(2).transpose());
+      g.noise = sigma * sigma * Eigen::Matrix3d::Identity();
+      g.count = 10;
+      groups.push_back(g);
+    }
+    VoxelMap forward{MapConfig{}}, backward{MapConfig{}};
+    forward.insert(groups, 0);
+    std::reverse(groups.begin(), groups.end());
+    backward.insert(groups, 0);
+    const Plane *a = forward.plane_at({0.5, 0.5, 0.5}), *b = backward.plane_at({0.5, 0.5, 0.5});
+    ASSERT_TRUE(a != nullptr && b != nullptr);
+    EXPECT_LT((a->centre - b->centre).norm(), 1e-9);
+    EXPECT_LT(a->normal.cross(b->normal).norm(), 3e-7F);  // floats
+    EXPECT_NEAR(a->offset_variance / b->offset_variance, 1, 1e-4);
+    EXPECT_EQ(forward.node_count(), backward.node_count());
+  }
+}
+
+TEST(VoxelMap, ASettledPlaneTakesNoMorePointsButOtherSurfacesStillFindTheirPlace) {
+  const auto floor = test::groups_of(test::points_on({0, 0, 0.1}, x_axis, y_axis, spacing), leaf, sigma);
+  VoxelMap map{MapConfig{}};
+  for (int i = 0; i < 3; ++i) map.insert(floor, 0);  // 1156 points each
+  const Plane before = *map.plane_at({0.5, 0.5, 0.1});
+  const std::size_t nodes = map.node_count();
+  // Biased within what the noise explains: would move the plane if it were taken.
+  auto biased = floor;
+  for (PointGroup& g : biased) g.mean.z() += 0.001;
+  for (int i = 0; i < 20; ++i) map.insert(biased, 0);
+  EXPECT_EQ(map.plane_at({0.5, 0.5, 0.1})->centre, before.centre);
+  EXPECT_EQ(map.plane_at({0.5, 0.5, 0.1})->offset_variance, before.offset_variance);
+  EXPECT_EQ(map.node_count(), nodes);
+  // A wall in the same voxel.
+  map.insert(test::groups_of(test::points_on({0.1, 0, 0.3}, 0.7 * z_axis, y_axis, spacing), leaf, sigma), 0);
+  EXPECT_EQ(map.plane_at({0.5, 0.5, 0.1})->centre, before.centre);
+  EXPECT_GE(planes_over(map, {0.1, 0.6, 0.8}), 2);
+}
+
+TEST(VoxelMap, TwoPlanesSeenOneAfterTheOtherAreToldApart) {
+  VoxelMap map = map_of(test::points_on({0.1, 0, 0.1}, 0.9 * x_axis, y_axis, spacing));
+  map.insert(test::groups_of(test::points_on({0.1, 0, 0.1}, 0.9 * z_axis, y_axis, spacing), leaf, sigma), 8);
+  map.insert(test::groups_of(test::points_on({0.1, 0, 0.1}, 0.9 * x_axis, y_axis, spacing), leaf, sigma), 9);
+  const Plane* wall = map.plane_at({0.1, 0.5, 0.8});
+  ASSERT_NE(wall, nullptr);
+  EXPECT_NEAR(std::abs(wall->normal.x()), 1, 1e-4);
+  const Plane* floor = map.plane_at({0.8, 0.5, 0.1});
+  ASSERT_NE(floor, nullptr);
+  EXPECT_NEAR(std::abs(floor->normal.z()), 1, 1e-4);
+}
+
+TEST(VoxelMap, WhatIsFartherThanTheRadiusIsForgotten) {
+  MapConfig config;
+  config.radius = 10;
+  VoxelMap map = map_of(test::points_on({-30, 0, 0.5}, 60 * x_axis, y_axis, 0.1), config);
+  map.forget({8, 0.5, 0.5});
+  for (double x = -29.5; x < 30; x += 1) {
+    EXPECT_EQ(map.plane_at({x, 0.5, 0.5}) != nullptr, std::abs(x - 8) <= 10) << x;
+  }
+}
+
+std::vector<PointGroup> surroundings(test::Random& random, const Eigen::Vector3d& centre, int count) {
+  std::vector<PointGroup> groups;
+  for (int i = 0; i < count; ++i) {
+    PointGroup g;
+    g.mean = centre + Eigen::Vector3d(random.uniform(-20, 20), random.uniform(-20, 20), random.uniform(-3, 3));
+    g.scatter = 1e-4 * Eigen::Matrix3d::Identity();
+    g.noise = 1e-4 * Eigen::Matrix3d::Identity();
+    g.count = 3;
+    groups.push_back(g);
+  }
+  return groups;
+}
+
+TEST(VoxelMap, MemoryIsBoundedOverTwoKilometresAndFreedNodesAreUsedAgain) {
+  test::Random random(2);
+  MapConfig config;
+  config.radius = 15;
+  config.max_nodes = 30000;
+  VoxelMap map(config);
+  std::size_t early = 0;
+  for (int step = 0; step < 2000; ++step) {
+    const Eigen::Vector3d centre(step - 1000.0, 0.3 * step, 0);
+    map.insert(surroundings(random, centre, 500), 0);
+    map.forget(centre);
+    ASSERT_LE(map.node_count(), static_cast<std::size_t>(config.max_nodes));
+    if (step == 200) early = map.memory_bytes();
+  }
+  EXPECT_LE(map.memory_bytes(), early + early / 4);
+  EXPECT_LE(map.node_capacity(), static_cast<std::size_t>(config.max_nodes) + 1500 + 2048);
+}
+
+TEST(VoxelMap, TooManyNodesDriveOutTheFarthestFirst) {
+  test::Random random(3);
+  MapConfig config;
+  config.max_nodes = 5000;
+  VoxelMap map(config);
+  map.insert(test::groups_of(test::points_on({-2, -2, 0.5}, 4 * x_axis, 4 * y_axis, 0.05), leaf, sigma), 0);
+  map.insert(surroundings(random, {30, 0, 0}, 20000), 0);
+  ASSERT_GT(map.node_count(), 5000U);
+  for (int i = 0; i < 20; ++i) map.forget({0, 0, 0});
+  EXPECT_LE(map.node_count(), 5000U);
+  EXPECT_GT(map.node_count(), 3000U);
+  EXPECT_NE(map.plane_at({0.5, 0.5, 0.5}), nullptr);
+}
+
+TEST(VoxelMap, PointsThatAreNowhereAreLeftOut) {
+  VoxelMap map{MapConfig{}};
+  PointGroup g;
+  g.count = 10;
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e9, -1e9}) {
+    g.mean = {1, bad, 2};
+    map.insert(std::vector<PointGroup>{g}, 0);
+  }
+  g.mean = {1, 2, 3};
+  g.count = 0;
+  map.insert(std::vector<PointGroup>{g}, 0);
+  EXPECT_TRUE(map.empty());
+  EXPECT_EQ(map.node_count(), 0U);
+}
+
+}  // namespace
+}  // namespace kilvo
