@@ -50,7 +50,7 @@ std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajec
     scan_first = std::min(scan_first, t);
     scan_last = std::max(scan_last, t);
   }
-  if (scan_last < scan_first) {
+  if (last < first || scan_last < scan_first) {
     drops.outside_trajectory += static_cast<std::uint32_t>(scan.points.size());
     return out;
   }

@@ -1,0 +1,148 @@
+#include "kilvo/lidar/degeneracy.hpp"
+
+#include <gtest/gtest.h>
+
+#include "kilvo/filter/update.hpp"
+#include "kilvo/lidar/point_to_plane.hpp"
+#include "tests/helpers/random.hpp"
+#include "tests/helpers/surface_groups.hpp"
+
+namespace kilvo {
+namespace {
+
+const Eigen::Vector3d x_axis = Eigen::Vector3d::UnitX(), y_axis = Eigen::Vector3d::UnitY(), z_axis = Eigen::Vector3d::UnitZ();
+
+// Two walls along x, 2 m apart, and the floor; turned about z by `yaw` so that no axis of the state is along it. Optionally its end.
+struct Corridor {
+  double yaw = 0.3;
+  bool with_end = false;
+  Eigen::Vector3d along() const { return SO3::Exp({0, 0, yaw}) * x_axis; }
+  std::vector<Eigen::Vector3d> points(double spacing) const {
+    std::vector<Eigen::Vector3d> out;
+    const auto add = [&](const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
+      for (const Eigen::Vector3d& x : test::points_on(corner, u, v, spacing)) out.push_back(SO3::Exp({0, 0, yaw}) * x);
+    };
+    add({-8, -1.03, -1.21}, 16 * x_axis, 2.5 * z_axis);
+    add({-8, 1.04, -1.21}, 16 * x_axis, 2.5 * z_axis);
+    add({-8, -1.03, -1.21}, 16 * x_axis, 2.07 * y_axis);
+    if (with_end) add({5.03, -1.03, -1.21}, 2.07 * y_axis, 2.5 * z_axis);
+    return out;
+  }
+};
+
+VoxelMap map_of(const Corridor& corridor) {
+  VoxelMap map{MapConfig{}};
+  const auto groups = test::groups_of(corridor.points(0.04), 0.25, 1e-4);
+  for (int i = 0; i < 3; ++i) map.insert(groups, 0);
+  return map;
+}
+
+std::vector<PointCluster> clusters_from(const Corridor& corridor, const SE3& T_WI) {
+  std::vector<PointXYZI> points;
+  for (const Eigen::Vector3d& x : corridor.points(0.1)) {
+    const Eigen::Vector3f p = (T_WI.inverse() * x).cast<float>();
+    points.emplace_back(p.x(), p.y(), p.z(), 0.0F);
+  }
+  return downsample(points, T_WI, 0.25);
+}
+
+struct Outcome {
+  Update update;
+  RegistrationReport report;
+};
+
+// `offset`: how far the prior is off along the corridor.
+Outcome register_in(const Corridor& corridor, const Eigen::Vector3d& offset, double sigma) {
+  const VoxelMap map = map_of(corridor);
+  const SE3 truth{SO3::Exp({0.1, -0.2, 0.5}), {0.2, 0.1, 0.05}};
+  const auto clusters = clusters_from(corridor, truth);
+  const LidarConfig config;
+  const Workers workers;
+  Estimate prior;
+  prior.x.R = truth.R;
+  prior.x.p = truth.p + offset;
+  prior.P.diagonal().setConstant(1e-6);
+  prior.P.diagonal().segment<3>(at::p).setConstant(sigma * sigma);
+  LidarModel model(map, clusters, Eigen::Vector3d::Zero(), PoseCovariance::Zero(), config, workers);
+  Outcome out{update(prior, model, {}), {}};
+  out.report = model.report();
+  return out;
+}
+
+TEST(Degeneracy, ThreeWallsHoldEveryDirection) {
+  Corridor corridor;
+  corridor.with_end = true;
+  const Outcome o = register_in(corridor, {0.02, 0.01, -0.02}, 0.05);
+  EXPECT_EQ(o.report.degeneracy.weak_count, 0);
+  EXPECT_GT(o.report.degeneracy.smallest_share, 0.002);
+  for (int i = 0; i < 3; ++i) EXPECT_LT(std::sqrt(o.update.posterior.P(at::p + i, at::p + i)), 0.003);
+}
+
+TEST(Degeneracy, ACorridorIsWeakAlongItselfAndNowhereElse) {
+  const Corridor corridor;
+  const Outcome o = register_in(corridor, Eigen::Vector3d::Zero(), 0.05);
+  ASSERT_EQ(o.report.degeneracy.weak_count, 1);
+  const Eigen::Matrix<double, 6, 1> weak = o.report.degeneracy.weak.col(0);
+  EXPECT_NEAR(weak.norm(), 1, 1e-12);
+  EXPECT_LT(weak.tail<3>().cross(corridor.along()).norm(), 1e-3);
+  EXPECT_LT(weak.head<3>().norm(), 3e-3);  // cells at the edges hold a little of two surfaces
+}
+
+TEST(Degeneracy, TheUpdateLeavesTheWeakDirectionAloneAndHoldsTheOthers) {
+  const Corridor corridor;
+  const double sigma = 0.05;
+  const Eigen::Vector3d along = corridor.along(), across = z_axis.cross(along);
+  const Outcome o = register_in(corridor, 0.05 * along + 0.03 * across - 0.02 * z_axis, sigma);
+  const SE3 truth{SO3::Exp({0.1, -0.2, 0.5}), {0.2, 0.1, 0.05}};
+  const Eigen::Vector3d error = o.update.posterior.x.p - truth.p;
+  EXPECT_NEAR(error.dot(along), 0.05, 1e-3);
+  EXPECT_NEAR(error.dot(across), 0, 1e-3);
+  EXPECT_NEAR(error.z(), 0, 1e-3);
+  const Eigen::Matrix3d P = o.update.posterior.P.block<3, 3>(at::p, at::p);
+  EXPECT_NEAR(std::sqrt(along.dot(P * along)), sigma, 1e-4);
+  EXPECT_LT(std::sqrt(across.dot(P * across)), 0.002);
+  EXPECT_LT(std::sqrt(P(2, 2)), 0.002);
+}
+
+TEST(Degeneracy, FakedInformationDoesNotCount) {
+  // A measures x only by what noisy normals fake.
+  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Identity() * 1e6, fake = Eigen::Matrix<double, 6, 6>::Zero();
+  A(3, 3) = fake(3, 3) = 1e5;
+  EXPECT_EQ(find_degeneracy(A, Eigen::Matrix<double, 6, 6>::Zero(), 0.002).weak_count, 0);
+  const Degeneracy d = find_degeneracy(A, fake, 0.002);
+  ASSERT_EQ(d.weak_count, 1);
+  EXPECT_NEAR(std::abs(d.weak(3, 0)), 1, 1e-9);
+}
+
+TEST(Degeneracy, WithoutAnyInformationNothingBreaks) {
+  const Eigen::Matrix<double, 6, 6> none = Eigen::Matrix<double, 6, 6>::Zero();
+  const Degeneracy d = find_degeneracy(none, none, 0.002);
+  Information<6> info;
+  project_out(d, none, info);
+  EXPECT_TRUE(info.A.allFinite());
+  EXPECT_EQ(weak_part(d).norm(), 0);
+}
+
+TEST(Degeneracy, ProjectingOutLeavesNothingAlongTheWeakDirectionInAnyUnits) {
+  test::Random random(1);
+  Degeneracy d;
+  d.lever = 3;
+  d.weak.col(0) = random.vector<6>().normalized();
+  d.weak_count = 1;
+  Information<6> info;
+  info.A = 1e6 * random.covariance<6>(1);
+  info.b = 1e3 * random.vector<6>();
+  project_out(d, Eigen::Matrix<double, 6, 6>::Identity() * 1e-6, info);
+  Eigen::Matrix<double, 6, 1> own = d.weak.col(0);
+  own.head<3>() /= d.lever;  // the pose error (rad, m) along it
+  EXPECT_LT((info.A * own).norm(), 1e-9 * info.A.norm());
+  EXPECT_LT(std::abs(info.b.dot(own)), 1e-9 * info.b.norm());
+  EXPECT_EQ(info.A, info.A.transpose());
+  // weak_part keeps exactly that error, and is a projection.
+  const Eigen::Matrix<double, 6, 6> W = weak_part(d);
+  EXPECT_LT((W * own - own).norm(), 1e-12);
+  EXPECT_LT((W * W - W).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace kilvo

@@ -1,0 +1,221 @@
+#include "kilvo/lidar/point_to_plane.hpp"
+
+#include <gtest/gtest.h>
+
+#include "kilvo/filter/update.hpp"
+#include "kilvo/lidar/point_noise.hpp"
+#include "tests/helpers/exact_map.hpp"
+#include "tests/helpers/random_state.hpp"
+
+namespace kilvo {
+namespace {
+
+TEST(PointToPlane, TheJacobianIsTheDerivativeAt200RandomStates) {
+  test::Random random(1);
+  for (int trial = 0; trial < 200; ++trial) {
+    const State x = test::random_state(random);
+    const Eigen::Vector3d p_I = random.vector3(10), n_W = random.direction(), q_W = random.vector3(10);
+    const PointToPlaneRow row = point_to_plane(x.pose(), p_I, n_W, q_W);
+    EXPECT_NEAR(row.r, n_W.dot(x.R * p_I + x.p - q_W), 1e-13);
+    constexpr double h = 1e-5;
+    for (int i = 0; i < 6; ++i) {
+      const ErrorVector d = h * ErrorVector::Unit(i);
+      const double numeric =
+          (point_to_plane(boxplus(x, d).pose(), p_I, n_W, q_W).r - point_to_plane(boxplus(x, -d).pose(), p_I, n_W, q_W).r) / (2 * h);
+      EXPECT_NEAR(row.J[i], numeric, 1e-6 * row.J.norm() + 1e-9) << i;
+    }
+  }
+}
+
+// A noise-free scan of the room taken at rest from `T_WI`.
+std::vector<PointXYZI> scan_from(const lab::AnalyticRoom& room, const SE3& T_WI, int count) {
+  std::vector<PointXYZI> points;
+  test::Random random(2);
+  while (static_cast<int>(points.size()) < count) {
+    const Eigen::Vector3d direction = random.direction();
+    double nearest = 1e9;
+    for (const lab::Rectangle& r : room.surfaces()) {
+      const Eigen::Vector3d n = r.u.cross(r.v), d = T_WI.R * direction;
+      const double range = n.dot(r.corner - T_WI.p) / n.dot(d);
+      const Eigen::Vector3d x = T_WI.p + range * d - r.corner;
+      const double a = x.dot(r.u) / r.u.squaredNorm(), b = x.dot(r.v) / r.v.squaredNorm();
+      if (range > 0.05 && a >= 0 && a <= 1 && b >= 0 && b <= 1) nearest = std::min(nearest, range);
+    }
+    if (nearest > 100) continue;
+    const Eigen::Vector3f p = (nearest * direction).cast<float>();
+    points.emplace_back(p.x(), p.y(), p.z(), 0.0F);
+  }
+  return points;
+}
+
+struct Registered {
+  Estimate posterior;
+  bool converged;
+  RegistrationReport report;
+  std::vector<EpochInformation> epochs;
+};
+
+const SE3 truth{SO3::Exp({0.05, -0.1, 0.7}), {0.4, -0.3, 0.1}};
+
+Registered register_scan(const VoxelMap& map, const std::vector<PointXYZI>& points, const State& guess, int threads,
+                         const LidarConfig& lidar = {}) {
+  const auto clusters = downsample(points, guess.pose(), lidar.voxel_size);
+  const Workers workers(threads);
+  Estimate prior;
+  prior.x = guess;
+  prior.P.diagonal().setConstant(1e-4);
+  prior.P.diagonal().segment<3>(at::R).setConstant(0.03 * 0.03);
+  prior.P.diagonal().segment<3>(at::p).setConstant(0.05 * 0.05);
+  LidarModel model(map, clusters, Eigen::Vector3d::Zero(), PoseCovariance::Zero(), lidar, workers);
+  UpdateConfig config;
+  config.max_iterations = 20;
+  const Update u = update(prior, model, config);
+  return {u.posterior, u.converged, model.report(), model.by_epoch()};
+}
+
+State truth_state() {
+  State x;
+  x.R = truth.R;
+  x.p = truth.p;
+  return x;
+}
+
+TEST(LidarModel, InAnExactMapItFindsThePoseFromFarOff) {
+  const lab::AnalyticRoom room({});
+  const VoxelMap map = test::exact_map(room.surfaces(), SE3{});
+  const auto points = scan_from(room, truth, 20000);
+  test::Random random(3);
+  for (int trial = 0; trial < 5; ++trial) {
+    ErrorVector off = ErrorVector::Zero();
+    off.head<3>() = 2 * std::numbers::pi / 180 * random.direction();
+    off.segment<3>(at::p) = 0.05 * random.direction();
+    const Registered r = register_scan(map, points, boxplus(truth_state(), off), 1);
+    EXPECT_TRUE(r.converged);
+    const ErrorVector left = boxminus(r.posterior.x, truth_state());
+    EXPECT_LT(left.segment<3>(at::p).norm(), 2e-4);
+    EXPECT_LT(left.head<3>().norm(), 0.01 * std::numbers::pi / 180);
+    EXPECT_GT(r.report.matched, r.report.clusters / 2);
+    EXPECT_EQ(r.report.degeneracy.weak_count, 0);
+  }
+}
+
+TEST(LidarModel, TheResultIsTheSameToTheBitForAnyNumberOfThreads) {
+  const lab::AnalyticRoom room({});
+  const VoxelMap map = test::exact_map(room.surfaces(), SE3{});
+  const auto points = scan_from(room, truth, 20000);
+  State guess = truth_state();
+  guess.p.x() += 0.03;
+  const Registered one = register_scan(map, points, guess, 1);
+  for (const int threads : {2, 4}) {
+    const Registered many = register_scan(map, points, guess, threads);
+    EXPECT_EQ(many.posterior.x.R.matrix(), one.posterior.x.R.matrix());
+    EXPECT_EQ(many.posterior.x.p, one.posterior.x.p);
+    EXPECT_EQ(many.posterior.P, one.posterior.P);
+    EXPECT_EQ(many.report.rejected, one.report.rejected);
+    EXPECT_EQ(many.report.chi2_per_row, one.report.chi2_per_row);
+  }
+}
+
+TEST(LidarModel, WithNoiseAsConfiguredTheResidualsAreOfUnitVariance) {
+  const lab::AnalyticRoom room({});
+  const VoxelMap map = test::exact_map(room.surfaces(), SE3{});
+  auto points = scan_from(room, truth, 20000);
+  test::Random random(4);
+  const LidarConfig lidar;
+  for (PointXYZI& p : points) {
+    const Eigen::Vector3d beam = p.head<3>().cast<double>();
+    const Eigen::Matrix3d L = point_noise(beam, lidar).llt().matrixL();
+    p.head<3>() += (L * random.vector3()).cast<float>();
+  }
+  const Registered r = register_scan(map, points, truth_state(), 1, lidar);
+  EXPECT_NEAR(r.report.chi2_per_row, 0.95, 0.15);  // Huber weights take a little off
+  const ErrorVector e = boxminus(r.posterior.x, truth_state());
+  EXPECT_LT(e.head<6>().dot(r.posterior.P.topLeftCorner<6, 6>().ldlt().solve(e.head<6>())), 22.5);  // 99.9 % of chi-square with 6
+}
+
+TEST(LidarModel, PointsFarFromTheirPlanesAreRejectedAndCounted) {
+  const lab::AnalyticRoom room({});
+  const VoxelMap map = test::exact_map(room.surfaces(), SE3{});
+  auto points = scan_from(room, truth, 5000);
+  const Registered clean = register_scan(map, points, truth_state(), 1);
+  // Something half a metre in front of what was a fifth of the view.
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].x() > 1.5F && std::abs(points[i].y()) < 1) points[i].head<3>() *= 0.85F;
+  }
+  const Registered r = register_scan(map, points, truth_state(), 1);
+  EXPECT_LT(r.report.matched, clean.report.matched);
+  EXPECT_LT(boxminus(r.posterior.x, truth_state()).segment<3>(at::p).norm(), 0.002);
+}
+
+TEST(LidarModel, WithoutAMapThereAreNoRows) {
+  const lab::AnalyticRoom room({});
+  const Registered r = register_scan(VoxelMap{MapConfig{}}, scan_from(room, truth, 1000), truth_state(), 1);
+  EXPECT_EQ(r.report.matched, 0);
+  EXPECT_EQ(r.report.rejected, 0);
+  EXPECT_EQ(r.posterior.x.p, truth.p);
+  EXPECT_TRUE(r.epochs.empty());
+}
+
+TEST(LidarModel, TheErrorOfAPlaneIsSharedByAllItsRows) {
+  // One wall of few noisy points: it is known to 2 mm, and 2500 points on it do not know it better.
+  const Eigen::Vector3d n = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(), z = Eigen::Vector3d::UnitZ();
+  const std::vector<PointGroup> groups = test::groups_of(test::points_on({2.5, 0, 0}, y, z, 0.06), 0.25, 0.03);
+  VoxelMap map{MapConfig{}};
+  map.insert(groups, 0);
+  const Plane* plane = map.plane_at({2.5, 0.5, 0.5});
+  ASSERT_NE(plane, nullptr);
+  std::vector<PointXYZI> points;
+  for (const Eigen::Vector3d& x : test::points_on({2.5, 0, 0}, y, z, 0.02)) points.emplace_back(x.x(), x.y(), x.z(), 0);
+  const auto clusters = downsample(points, SE3{}, 0.25);
+  const LidarConfig lidar;
+  const Workers workers;
+  LidarModel model(map, clusters, Eigen::Vector3d::Zero(), PoseCovariance::Zero(), lidar, workers);
+  Covariance P = Covariance::Zero();
+  P.diagonal().head<6>().setConstant(1e-8);
+  const Information<6> info = model(State{}, P);
+  EXPECT_GT(info.rows, 10);
+  const double known = n.dot(info.A.bottomRightCorner<3, 3>() * n);
+  EXPECT_LT(known, 1.0 / static_cast<double>(plane->offset_variance));
+  EXPECT_GT(known, 0.3 / static_cast<double>(plane->offset_variance));
+}
+
+TEST(LidarModel, TheInformationByEpochAddsUpToAll) {
+  const lab::AnalyticRoom room({});
+  VoxelMap map{MapConfig{}};
+  for (std::size_t i = 0; i < room.surfaces().size(); ++i) {
+    const lab::Rectangle& r = room.surfaces()[i];
+    map.insert(test::groups_of(test::points_on(r.corner, r.u, r.v, 0.04), 0.25, 1e-3), static_cast<std::uint32_t>(i % 3));
+  }
+  const auto points = scan_from(room, truth, 5000);
+  const auto clusters = downsample(points, truth, 0.25);
+  const LidarConfig lidar;
+  const Workers workers;
+  LidarModel model(map, clusters, Eigen::Vector3d::Zero(), PoseCovariance::Zero(), lidar, workers);
+  Covariance P = Covariance::Zero();
+  P.diagonal().head<6>().setConstant(1e-4);
+  const Information<6> info = model(truth_state(), P);
+  Eigen::Matrix<double, 6, 6> sum = Eigen::Matrix<double, 6, 6>::Zero();
+  for (const EpochInformation& e : model.by_epoch()) sum += e.A;
+  EXPECT_EQ(model.by_epoch().size(), 3U);
+  EXPECT_LT((sum - info.A).norm(), 1e-9 * info.A.norm());
+}
+
+TEST(ToWorld, GroupsAreTheClustersSeenFromTheWorld) {
+  test::Random random(5);
+  PointCluster c;
+  c.mean = {3, 1, -2};
+  c.count = 5;
+  c.scatter << 1, 0.1F, 0.2F, 2, 0.3F, 3;
+  const SE3 T_WI{random.rotation(), random.vector3(10)};
+  const Eigen::Vector3d p_IL(0.1, 0.2, 0.3);
+  const auto groups = to_world(std::vector<PointCluster>{c}, T_WI, p_IL, {});
+  ASSERT_EQ(groups.size(), 1U);
+  EXPECT_LT((groups[0].mean - T_WI * Eigen::Vector3d(3, 1, -2)).norm(), 1e-12);
+  EXPECT_LT((groups[0].scatter - T_WI.R.matrix() * c.scatter_matrix().cast<double>() * T_WI.R.matrix().transpose()).norm(), 1e-12);
+  const Eigen::Vector3d beam_W = T_WI.R * (Eigen::Vector3d(3, 1, -2) - p_IL);
+  EXPECT_LT((groups[0].noise - point_noise(beam_W, {})).norm(), 1e-15);
+  EXPECT_EQ(groups[0].count, 5);
+}
+
+}  // namespace
+}  // namespace kilvo
