@@ -123,6 +123,19 @@ TEST(PointTime, AClockThatIsNotTheStampsCountsFromTheEarliestPoint) {
   EXPECT_LE(worst_offset(messages[1], *format), 1);
 }
 
+TEST(PointTime, ALonePointWithTimeZeroDoesNotBecomeTheOriginOfSuchAClock) {
+  auto cloud = TinyCloud::line(points);
+  cloud.with_times<double>("timestamp", ScalarType::float64, [](std::size_t i) { return 777 + since_start(i); });
+  cloud.set(5, 16, 0.0);
+  const auto format = detect({cloud.bytes()});
+  ASSERT_TRUE(format) << format.reason();
+  EXPECT_EQ(format->reference, TimeReference::other_clock);
+  const auto decoded = decode_point_cloud2(cloud.bytes(), *format);
+  ASSERT_TRUE(decoded);
+  EXPECT_EQ(decoded->absurd_times, 1U);
+  EXPECT_EQ(decoded->scan.points.size(), points - 1);
+}
+
 TEST(PointTime, OnAYoungClockRelativeTimesAreNotTakenForAbsolute) {
   const auto young = [](bool absolute) {
     std::vector<CloudTimes> clouds;
