@@ -191,6 +191,20 @@ TEST(RecordingSource, UndecodableMessagesAreDroppedCountedAndExplained) {
                                      "fit the message's 10 bytes"));
 }
 
+TEST(RecordingSource, AMessageOfMoreThan64MegabytesIsDroppedUnread) {
+  const TemporaryFolder folder;
+  {
+    Rosbag1Writer writer(folder / "huge.bag");
+    const auto id = writer.add_connection("/camera/image_raw", written_type(Sensor::camera));
+    writer.write(id, tiny_begin, std::vector<std::uint8_t>(most_message_bytes + 1));
+    writer.close();
+  }
+  RecordingSource source(folder / "huge.bag", use({Sensor::camera}));
+  EXPECT_TRUE(drain(source).empty());
+  EXPECT_EQ(source.counts(Sensor::camera).dropped, (std::map<std::string, std::uint64_t>{{"too_large", 1}}));
+  EXPECT_THAT(source.warnings(), ::testing::ElementsAre("/camera/image_raw: 1 message of more than 64 MB not read"));
+}
+
 TEST(RecordingSource, PointsWithAbsurdTimesAreCountedAndWarnedOf) {
   const TemporaryFolder folder;
   auto cloud = TinyCloud::line(150);

@@ -18,20 +18,22 @@ BagChunkReader::BagChunkReader(const FileBytes& file, const BagChunk& chunk)
     : file_(&file),
       chunk_(chunk),
       size_(chunk.data_size),
+      good_(chunk.data_size),
       window_(file, is_compressed(chunk) ? 0 : std::min<std::uint64_t>(window_bytes, chunk.data_size)) {
   if (!is_compressed(chunk)) return;
+  Inflated inflated;
   if (chunk.data_size > most_chunk_bytes) {
-    size_ = 0;
-    note(0, "the chunk is too large");
-    return;
+    inflated.fault = "is too large";
+  } else {
+    std::vector<std::uint8_t> compressed(static_cast<std::size_t>(chunk.data_size));
+    compressed.resize(file.read_at(chunk.data_offset, compressed));
+    inflated = inflate_chunk(chunk.compression, compressed, chunk.inflated_size);
   }
-  std::vector<std::uint8_t> compressed(static_cast<std::size_t>(chunk.data_size));
-  compressed.resize(file.read_at(chunk.data_offset, compressed));
-  auto inflated = inflate_chunk(chunk.compression, compressed, chunk.inflated_size);
   inflated_ = std::move(inflated.bytes);
   size_ = inflated_.size();
-  // That a shortened chunk lacks its end is known; and its good beginning is no damage.
-  if (!inflated.fault.empty() && !(chunk.shortened && size_ > 0)) note(0, "the chunk " + inflated.fault);
+  good_ = inflated.good;
+  // That such a chunk lacks its end is known already.
+  if (!inflated.fault.empty() && !(chunk.doubtful_end && good_ > 0)) damage_ = Damage{chunk.offset, "the chunk " + inflated.fault};
 }
 
 Bytes BagChunkReader::view(std::uint64_t offset, std::uint64_t count) {
@@ -42,12 +44,13 @@ Bytes BagChunkReader::view(std::uint64_t offset, std::uint64_t count) {
 }
 
 void BagChunkReader::note(std::uint64_t offset, const std::string& reason) {
-  if (!damage_) damage_ = Damage{is_compressed(chunk_) ? chunk_.offset : chunk_.data_offset + offset, reason};
+  if (!damage_ && !chunk_.doubtful_end) damage_ = Damage{is_compressed(chunk_) ? chunk_.offset : chunk_.data_offset + offset, reason};
   position_ = size_;
 }
 
 std::optional<BagEntry> BagChunkReader::scan(const std::function<void(const BagConnection&)>& on_connection) {
-  while (position_ < size_) {
+  const std::uint64_t end = on_connection ? size_ : good_;
+  while (position_ < end) {
     const std::uint64_t begin = position_;
     const std::size_t header_size = ByteReader(view(begin, 4)).read<std::uint32_t>();
     ByteReader reader(header_size <= most_header_bytes ? view(begin, header_size + 8) : Bytes{});
@@ -56,13 +59,14 @@ std::optional<BagEntry> BagChunkReader::scan(const std::function<void(const BagC
     const auto data_size = reader.read<std::uint32_t>();
     const std::uint64_t data = begin + header_size + 8;
     if (!reader.ok() || !header || data_size > size_ - data) {
-      if (!chunk_.shortened) note(begin, "a damaged record in a chunk");
-      position_ = size_;
+      note(begin, "a damaged record in a chunk");
       return std::nullopt;
     }
     position_ = data + data_size;
-    if (header->op == BagOp::message && header->connection && header->time)
+    if (header->op == BagOp::message && header->connection && header->time) {
+      if (position_ > good_) continue;
       return BagEntry{*header->time, data, data_size, *header->connection};
+    }
     if (header->op != BagOp::connection) {
       note(begin, "a record in a chunk that does not belong there");
       return std::nullopt;

@@ -23,7 +23,7 @@ class BagChunkReader {
   BagChunkReader(const FileBytes& file, const BagChunk& chunk);
 
   /// The next message in the order of the file, or nothing at the end of the chunk or of what can be read of it. Connection records
-  /// on the way go to `on_connection`, if there is one.
+  /// on the way go to `on_connection`, if there is one: also those in data of which the messages are too doubtful to be given.
   std::optional<BagEntry> scan(const std::function<void(const BagConnection&)>& on_connection = {});
 
   /// The bytes of a message, valid until the next call of any function. Empty when the file can no longer be read.
@@ -43,6 +43,7 @@ class BagChunkReader {
   BagChunk chunk_;
   std::vector<std::uint8_t> inflated_;
   std::uint64_t size_ = 0;  // of the content
+  std::uint64_t good_ = 0;  // of it: beyond, a damaged chunk was inflated to who knows what
   FileWindow window_;
   std::vector<std::uint8_t> large_;  // a message that does not fit the window
   std::uint64_t position_ = 0;

@@ -74,6 +74,8 @@ class DamagedBag : public ::testing::TestWithParam<const char*> {
 };
 
 TEST_P(DamagedBag, CutAnywhereEverythingBeforeTheCutIsDelivered) {
+  std::multiset<KeptMessage> originals;
+  for (const auto& m : placed) originals.insert(m.message);
   for (int i = 0; i < 200; ++i) {
     const std::size_t cut = bag_magic.size() + random() % (content.size() - bag_magic.size());
     bool damaged = false;
@@ -81,6 +83,7 @@ TEST_P(DamagedBag, CutAnywhereEverythingBeforeTheCutIsDelivered) {
     ASSERT_TRUE(delivered);
     EXPECT_TRUE(damaged) << cut;
     EXPECT_EQ(missing(placed, *delivered, [&](const PlacedMessage& m) { return m.end <= cut; }), 0) << "cut at " << cut;
+    for (const auto& message : *delivered) EXPECT_TRUE(originals.contains(message)) << "half a message is none; cut at " << cut;
   }
 }
 
@@ -156,6 +159,65 @@ TEST(DamagedChunk, AHeaderAtTheVeryEndIsNotFoundAgainAndAgain) {
   bool damaged = false;
   ASSERT_TRUE(read_content(content, &damaged));
   EXPECT_TRUE(damaged);
+}
+
+TEST(DamagedChunk, TopicsOfADamagedFirstChunkAreKnownEvenWhenTheEndOfTheBagIsMissing) {
+  Content content = tiny_bag_content("lz4");
+  const auto chunks = read_bag_layout(FileBytes(content)).chunks;
+  content.resize(chunks[5].offset);
+  content[chunks[0].data_offset + chunks[0].data_size - 1] ^= 0x40;  // the checksum over the content
+  Rosbag1Reader reader{FileBytes(content)};
+  EXPECT_EQ(reader.connections().size(), 4U);
+  const auto messages = read_all(reader);
+  EXPECT_GT(messages.size(), 20U);
+  const auto intact = place_messages(content);
+  EXPECT_EQ(messages.size(), intact.size()) << "of the damaged chunk itself nothing is believed";
+}
+
+TEST(DamagedChunk, ACutBetweenTheIndexRecordsOfAChunkLosesNoTopic) {
+  const Content content = tiny_bag_content("none");
+  const auto chunks = read_bag_layout(FileBytes(content)).chunks;
+  ASSERT_TRUE(chunks.at(1).new_connections) << "the first image is in the second chunk";
+  const std::size_t index = chunks[1].data_offset + chunks[1].data_size;
+  ByteReader first_index(Bytes(content).subspan(index));
+  first_index.array();  // header
+  first_index.array();  // data: of a topic that the first chunk has too
+  const auto end = content.begin() + static_cast<std::ptrdiff_t>(index + first_index.position());
+  const Rosbag1Reader bag{FileBytes(Content(content.begin(), end))};
+  EXPECT_EQ(bag.connections().size(), 4U);
+}
+
+TEST(DamagedChunk, AChunkThatIsNotSaidToBeOneIsNotLostSilently) {
+  const Content content = tiny_bag_content("none");
+  const auto placed = place_messages(content);
+  const auto chunk = read_bag_layout(FileBytes(content)).chunks.at(2);
+  const std::string op = "op=";
+  const auto at = static_cast<std::size_t>(
+      std::search(content.begin() + static_cast<std::ptrdiff_t>(chunk.offset), content.end(), op.begin(), op.end()) - content.begin());
+  for (const int other : {0, 1, 2, 3, 4, 6, 7, 8, 255}) {
+    Content lying = content;
+    ASSERT_EQ(lying[at + 3], 5);
+    lying[at + 3] = static_cast<std::uint8_t>(other);
+    bool damaged = false;
+    const auto delivered = read_content(lying, &damaged);
+    ASSERT_TRUE(delivered);
+    EXPECT_TRUE(damaged) << other;
+    EXPECT_EQ(missing(placed, *delivered, [&](const PlacedMessage& m) { return m.chunk_begin != chunk.offset; }), 0) << other;
+  }
+}
+
+TEST(DamagedChunk, AFalseLengthIsOneDamageAndNoLoss) {
+  const Content content = tiny_bag_content("none");
+  const auto placed = place_messages(content);
+  const auto chunk = read_bag_layout(FileBytes(content)).chunks.at(2);
+  for (const std::uint64_t length : {chunk.data_size + 1, chunk.data_size + 5000, std::uint64_t{0xFFFFFFFF}}) {
+    Content lying = content;
+    const auto claimed = static_cast<std::uint32_t>(length);
+    std::memcpy(lying.data() + chunk.data_offset - 4, &claimed, 4);
+    Rosbag1Reader reader{FileBytes(lying)};
+    EXPECT_EQ(read_all(reader).size(), placed.size()) << length;
+    EXPECT_EQ(reader.damages().size(), 1U) << length;
+  }
 }
 
 TEST(DamagedChunk, AFalseInflatedSizeCostsNoMemory) {

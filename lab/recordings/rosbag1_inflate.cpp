@@ -16,36 +16,46 @@ void grow(std::vector<std::uint8_t>& bytes, Bytes compressed, std::size_t size) 
   bytes.resize(std::min(size + 1, std::max(usual_ratio * compressed.size(), 2 * bytes.size())));
 }
 
-Inflated failed(std::string fault) { return {{}, std::move(fault)}; }
+Inflated refused(std::string fault) { return {{}, 0, std::move(fault)}; }
+
+Inflated doubtful(std::vector<std::uint8_t> bytes, std::size_t filled, std::string fault) {
+  bytes.resize(filled);
+  return {std::move(bytes), 0, std::move(fault)};
+}
 
 Inflated finished(std::vector<std::uint8_t> bytes, std::size_t filled, std::size_t size) {
   bytes.resize(filled);
   const bool short_of = filled < size;
-  return {std::move(bytes), short_of ? "inflates to " + std::to_string(filled) + " bytes instead of " + std::to_string(size) : ""};
+  return {std::move(bytes), filled, short_of ? "inflates to " + std::to_string(filled) + " bytes instead of " + std::to_string(size) : ""};
 }
+
+constexpr std::size_t checksum_bytes = 4;
+constexpr std::size_t lz4_step = 1 << 16;
 
 /// rosbag's lz4 stream is the LZ4 frame format.
 Inflated inflate_lz4(Bytes compressed, std::size_t size) {
   LZ4F_dctx* raw = nullptr;
-  if (LZ4F_isError(LZ4F_createDecompressionContext(&raw, LZ4F_VERSION)) != 0) return failed("lz4: no memory");
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&raw, LZ4F_VERSION)) != 0) return refused("lz4: no memory");
   const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(raw, &LZ4F_freeDecompressionContext);
   std::vector<std::uint8_t> bytes;
   std::size_t in = 0, out = 0;
   while (true) {
     if (out == bytes.size()) grow(bytes, compressed, size);
-    std::size_t given = bytes.size() - out, taken = compressed.size() - in;
+    // What a failing call had inflated is lost, hence many calls; and the checksum at the end is a call of its own.
+    const std::size_t left = compressed.size() - in;
+    std::size_t given = bytes.size() - out, taken = left > checksum_bytes ? std::min(left - checksum_bytes, lz4_step) : left;
     const std::size_t hint = LZ4F_decompress(context.get(), bytes.data() + out, &given, compressed.data() + in, &taken, nullptr);
-    if (LZ4F_isError(hint) != 0) return failed(std::string("lz4: ") + LZ4F_getErrorName(hint));
+    if (LZ4F_isError(hint) != 0) return doubtful(std::move(bytes), out, std::string("lz4: ") + LZ4F_getErrorName(hint));
     in += taken;
     out += given;
-    if (out > size) return failed("lz4: more data than the chunk claims");
+    if (out > size) return doubtful(std::move(bytes), size, "lz4: more data than the chunk claims");
     if (hint == 0 || (taken == 0 && given == 0)) return finished(std::move(bytes), out, size);
   }
 }
 
 Inflated inflate_bz2(Bytes compressed, std::size_t size) {
   bz_stream stream{};
-  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return failed("bz2: no memory");
+  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return refused("bz2: no memory");
   const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> owner(&stream, &BZ2_bzDecompressEnd);
   // bzlib is old and takes its input as non-const; it does not write to it.
   stream.next_in = const_cast<char*>(reinterpret_cast<const char*>(compressed.data()));
@@ -58,9 +68,10 @@ Inflated inflate_bz2(Bytes compressed, std::size_t size) {
     stream.avail_out = static_cast<unsigned>(bytes.size() - out);
     const unsigned room = stream.avail_out, input = stream.avail_in;
     const int result = BZ2_bzDecompress(&stream);
-    if (result != BZ_OK && result != BZ_STREAM_END) return failed("bz2: damaged data (" + std::to_string(result) + ")");
     out += room - stream.avail_out;
-    if (out > size) return failed("bz2: more data than the chunk claims");
+    if (out > size) return doubtful(std::move(bytes), size, "bz2: more data than the chunk claims");
+    if (result != BZ_OK && result != BZ_STREAM_END)
+      return doubtful(std::move(bytes), out, "bz2: damaged data (" + std::to_string(result) + ")");
     const bool stuck = stream.avail_out == room && stream.avail_in == input;
     if (result == BZ_STREAM_END || stuck) return finished(std::move(bytes), out, size);
   }
@@ -69,11 +80,11 @@ Inflated inflate_bz2(Bytes compressed, std::size_t size) {
 }  // namespace
 
 Inflated inflate_chunk(std::string_view compression, Bytes compressed, std::size_t size) {
-  if (size > most_chunk_bytes) return failed("claims to inflate to " + std::to_string(size) + " bytes");
-  if (compressed.empty()) return failed("has no data");
+  if (size > most_chunk_bytes) return refused("claims to inflate to " + std::to_string(size) + " bytes");
+  if (compressed.empty()) return refused("has no data");
   if (compression == "lz4") return inflate_lz4(compressed, size);
   if (compression == "bz2") return inflate_bz2(compressed, size);
-  return failed("unknown compression " + std::string(compression.substr(0, 20)));
+  return refused("unknown compression " + std::string(compression.substr(0, 20)));
 }
 
 }  // namespace kilvo::lab

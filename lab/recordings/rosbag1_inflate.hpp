@@ -13,11 +13,12 @@ inline constexpr std::size_t most_chunk_bytes = std::size_t{256} << 20;
 
 struct Inflated {
   std::vector<std::uint8_t> bytes;
-  std::string fault;  // empty: all of it. Otherwise `bytes` is the beginning that is known to be good, possibly nothing
+  std::size_t good = 0;  // so many of them are known to be right; the rest is what a damaged chunk gave
+  std::string fault;     // empty: all of the chunk
 };
 
 /// `compression` is "lz4" or "bz2"; `size` what the chunk claims to be when inflated: more is a fault. Input that only ends too early
-/// gives its good beginning; input that fails its checksum gives nothing, since nobody knows where it went wrong.
+/// gives a good beginning; of input that fails its checksum nothing is good, since nobody knows where it went wrong.
 Inflated inflate_chunk(std::string_view compression, Bytes compressed, std::size_t size);
 
 }  // namespace kilvo::lab

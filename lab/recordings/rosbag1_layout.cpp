@@ -58,7 +58,7 @@ class Walk {
     if (record.header.op == BagOp::chunk && is_chunk_header(record.header)) {
       begin_chunk(record, at);
       if (whole) return record.data_offset + record.data_size;
-      layout_.chunks.back().shortened = true;
+      layout_.chunks.back().doubtful_end = true;
       return lost(at, "the chunk is longer than the file");
     }
     if (!whole) return lost(at, "the record is longer than the file");
@@ -98,7 +98,7 @@ class Walk {
     resynced_ = true;
     if (search_in_chunk && next) {
       BagChunk& chunk = layout_.chunks.back();
-      chunk.shortened |= *next - chunk.data_offset < chunk.data_size;
+      chunk.doubtful_end = true;
       chunk.data_size = std::min(chunk.data_size, *next - chunk.data_offset);
     }
     return next;

@@ -32,7 +32,7 @@ struct BagChunk {
   std::uint64_t data_size = 0;    // as far as it is in the file and no other chunk begins
   std::uint32_t inflated_size = 0;
   std::string compression;       // none, lz4, bz2
-  bool shortened = false;        // its data do not reach as far as it claims: said among the damages
+  bool doubtful_end = false;     // its length is false, or the file ends in it: said among the damages
   bool indexed = false;          // its index records were read, and with them the times below
   bool new_connections = false;  // the index has a connection that no chunk before it has
   Time first{}, last{};
