@@ -49,6 +49,7 @@ void add_config(CLI::App& program, Action& chosen) {
   auto options = std::make_shared<ConfigOptions>();
   CLI::App* verb = program.add_subcommand("config", "check or show a configuration");
   verb->require_subcommand(1);
+  verb->get_formatter()->label("SUBCOMMAND", "VERB");
   const auto add_set = [&options](CLI::App* to) {
     to->add_option("--set", options->overrides, "override one setting, repeatable")->type_name("KEY=VALUE")->allow_extra_args(false);
   };

@@ -15,24 +15,34 @@
 namespace kilvo::cli {
 namespace {
 
+// "run: " when that is the verb whose words are wrong.
+std::string where(const CLI::App& program) {
+  const auto verbs = program.get_subcommands();
+  return verbs.empty() ? "" : verbs.front()->get_name() + ": ";
+}
+
 int parse_and_do(const std::vector<std::string>& words) {
   CLI::App program("Odometry and a map for humanoid robots, from their legs, inertial unit, LiDAR and camera.", "kilvo");
-  program.set_help_flag("--help,-h", "what can be done, and how");
-  program.set_version_flag("--version", "kilvo " KILVO_VERSION);
+  program.set_help_flag("--help,-h", "this text, or that of a verb");
+  program.set_version_flag("--version", "kilvo " KILVO_VERSION, "the program's version");
   program.require_subcommand(0, 1);
+  program.get_formatter()->label("SUBCOMMAND", "VERB");
+  program.footer(
+      "Each verb has its own: kilvo VERB --help\nExit codes: 0 done, 1 the run failed, 2 wrong usage or configuration, 3 unusable input");
   Action chosen;
   add_run(program, chosen);
   add_info(program, chosen);
   add_eval(program, chosen);
   add_config(program, chosen);
   add_demo(program, chosen);
+  for (CLI::App* verb : program.get_subcommands({})) verb->group("Verbs");
   check_words(words, program);
   try {
     program.parse(std::vector<std::string>(words.rbegin(), words.rend()));
   } catch (const CLI::Success& asked) {  // --help, --version
     return program.exit(asked);
   } catch (const CLI::ParseError& error) {
-    throw UsageError(error.what());
+    throw UsageError(where(program) + error.what());
   }
   if (!chosen) {
     fmt::print(stderr, "{}", program.help());

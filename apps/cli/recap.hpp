@@ -44,6 +44,8 @@ class Recap {
   std::size_t sweeps() const { return sweeps_; }
   const std::optional<StampedState>& first() const { return first_; }
   const std::optional<StampedState>& last() const { return last_; }
+  /// From the first output to the last.
+  double seconds() const { return first_ ? to_seconds(last_->t - first_->t) : 0; }
   /// Of the way through the sweeps, or through ten poses a second where there are none: jitter in between adds nothing.
   double path_length() const { return path_length_; }
   double start_to_end() const { return first_ ? (last_->T_WI.p - first_->T_WI.p).norm() : 0; }

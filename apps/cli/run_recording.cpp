@@ -19,8 +19,6 @@
 namespace kilvo::cli {
 namespace {
 
-using WallClock = std::chrono::steady_clock;
-
 double mount_rate(const Robot& robot, Sensor sensor) {
   const double rates[] = {robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate};
   return rates[static_cast<std::size_t>(sensor)];
@@ -59,6 +57,14 @@ void tell_start(const RunFacts& facts, const lab::RecordingSource& source, bool 
   for (const std::string& text : facts.notes) fmt::print(stderr, "kilvo: {}\n", text);
 }
 
+Estimator make_estimator(const lab::Settings& settings, const std::vector<Sensor>& used) {
+  try {
+    return {settings.robot, settings.estimator, as_flags(used)};
+  } catch (const std::invalid_argument& error) {
+    throw lab::ConfigError(error.what());
+  }
+}
+
 /// Everything between the first message and the last file.
 class Run {
  public:
@@ -68,7 +74,7 @@ class Run {
         settings_(std::move(settings)),
         facts_(std::move(facts)),
         source_(options.input, recording_options(options, settings_, choice.used)),
-        estimator_(settings_.robot, settings_.estimator, as_flags(choice.used)),
+        estimator_(make_estimator(settings_, choice.used)),
         map_(settings_.mapping, options.threads > 1),
         files_(options.out),
         progress_(Progress::style_for(options.quiet)) {
@@ -76,7 +82,6 @@ class Run {
   }
 
   int all() {
-    const auto begin = WallClock::now();
     const bool interrupted = replay();
     progress_.finish();
     files_.close();
@@ -84,8 +89,7 @@ class Run {
     const lab::MapBuilder& map = map_.finish();
     if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map);
     facts_.map_points = map.size();
-    facts_.wall_seconds = std::chrono::duration<double>(WallClock::now() - begin).count();
-    facts_.data_seconds = first_ ? to_seconds(last_ - *first_) : 0;
+    facts_.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - facts_.begin).count();
     write_text_file(options_.out / "summary.json", summary_json(facts_, settings_, source_, estimator_.statistics(), files_.recap()));
     tell_end();
     return facts_.failure.empty() ? done : run_failed;
@@ -97,8 +101,6 @@ class Run {
     ReadAhead input(source_, options_.threads > 1);
     bool interrupted = false;
     while (auto measurement = input.next()) {
-      last_ = std::max(last_, stamp_of(*measurement));
-      if (!first_) first_ = last_;
       keep(estimator_.push(*std::move(measurement)));
       progress_.update(input.progress(), [this] { return progress_note(); });
       interrupted = interrupt_.requested();
@@ -142,7 +144,7 @@ class Run {
     if (!facts_.failure.empty()) fmt::print(stderr, "kilvo: error: {}\n", facts_.failure);
     if (options_.quiet) return;
     fmt::print("{}: {} poses, {} sweeps, path {:.2f} m, start to end {:.3f} m, {:.1f} s of data in {:.2f} s\n", options_.out.string(),
-               recap.outputs(), recap.sweeps(), recap.path_length(), recap.start_to_end(), facts_.data_seconds, facts_.wall_seconds);
+               recap.outputs(), recap.sweeps(), recap.path_length(), recap.start_to_end(), recap.seconds(), facts_.wall_seconds);
   }
 
   const RunOptions& options_;
@@ -154,13 +156,12 @@ class Run {
   MapKeeper map_;
   ResultFiles files_;
   Progress progress_;
-  std::optional<Time> first_;
-  Time last_ = Time::min();
 };
 
 }  // namespace
 
 int run_recording(const RunOptions& options) {
+  RunFacts facts;
   const std::filesystem::path config = config_file(options.config, options.input);
   lab::Settings settings = lab::load_settings(config, options.overrides);
   prepare_folder(options.out);
@@ -169,7 +170,6 @@ int run_recording(const RunOptions& options) {
   lab::require_complete(settings, choice.used);
   // Reading and the map keep about one core busy.
   if (!settings.given.contains("estimator.threads")) settings.estimator.threads = std::max(1, options.threads - 1);
-  RunFacts facts;
   facts.input = options.input;
   facts.config_file = config.string();
   facts.sensors = choice.used;

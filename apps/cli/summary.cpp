@@ -91,9 +91,9 @@ std::string summary_json(const RunFacts& facts, const lab::Settings& settings, c
   json["start_to_end_m"] = recap.start_to_end();
   json["stage_us"] = stages_json(recap);
   json["mean_ms_per_frame"] = recap.sweeps() == 0 ? 0 : recap.stages.total() * 1e-3 / static_cast<double>(recap.sweeps());
-  json["data_seconds"] = facts.data_seconds;
+  json["data_seconds"] = recap.seconds();
   json["wall_seconds"] = facts.wall_seconds;
-  json["real_time_factor"] = facts.wall_seconds > 0 ? facts.data_seconds / facts.wall_seconds : 0;
+  json["real_time_factor"] = facts.wall_seconds > 0 ? recap.seconds() / facts.wall_seconds : 0;
   json["peak_memory_mb"] = tenths(peak_memory_mb());
   json["config"] = Json::parse(lab::settings_json(settings));
   return json.dump(2, ' ', false, Json::error_handler_t::replace);

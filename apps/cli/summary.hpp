@@ -1,6 +1,7 @@
 // summary.json: the run in one file.
 #pragma once
 
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -12,11 +13,12 @@
 namespace kilvo::cli {
 
 struct RunFacts {
+  std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
   std::string input, config_file;
   std::vector<Sensor> sensors;
   std::vector<std::string> notes, warnings;  // of the choice of sensors
   std::string failure;                       // why the run failed; empty when it did not
-  double data_seconds = 0, wall_seconds = 0;
+  double wall_seconds = 0;
   std::size_t map_points = 0;
 };
 
