@@ -6,11 +6,12 @@
 namespace kilvo {
 namespace {
 
-constexpr int depth = 2;
 // A plane is fitted again when its points have grown by this factor.
 constexpr double refit_growth = 1.25;
 // A settled plane explains a group whose mean lies within this many standard deviations.
 constexpr double settled_sigmas = 4.0;
+// So many points wait for memory at once; what they wait for must fit the innermost cache.
+constexpr std::size_t together = 32;
 
 Eigen::Vector3d centre_of(VoxelKey key, double size) {
   const auto coordinate = [key](int shift) {
@@ -39,15 +40,11 @@ void VoxelMap::Pool<T>::give_back(std::uint32_t i) {
   free.push_back(i);
 }
 
-VoxelMap::VoxelMap(const MapConfig& config) : config_(config), inverse_size_(1.0 / config.voxel_size) {}
+VoxelMap::VoxelMap(const MapConfig& config) : config_(config), leaves_per_metre_((1 << depth) * (1.0 / config.voxel_size)) {}
 
-Eigen::Vector3d VoxelMap::root_centre(const Eigen::Vector3d& x) const {
-  const auto coordinate = [this](double v) { return (static_cast<double>(fast_floor(v * inverse_size_)) + 0.5) * config_.voxel_size; };
-  return {coordinate(x.x()), coordinate(x.y()), coordinate(x.z())};
-}
-
-Eigen::Vector3d VoxelMap::child_centre(const Eigen::Vector3d& centre, unsigned octant, double quarter) {
-  return centre + quarter * Eigen::Vector3d(octant & 1u ? 1 : -1, octant & 2u ? 1 : -1, octant & 4u ? 1 : -1);
+Eigen::Vector3d VoxelMap::root_centre(const Leaf& l) const {
+  const auto coordinate = [this](std::int64_t v) { return (static_cast<double>(v >> depth) + 0.5) * config_.voxel_size; };
+  return {coordinate(l[0]), coordinate(l[1]), coordinate(l[2])};
 }
 
 const Plane* VoxelMap::plane_at(const Eigen::Vector3d& x) const {
@@ -59,12 +56,62 @@ const Plane* VoxelMap::plane_at(const Eigen::Vector3d& x) const {
   return found;
 }
 
-bool VoxelMap::settled_and_explains(const Node& node, const PointGroup& group) const {
-  if (!node.is_plane || node.moments.count() < config_.full_points) return false;
-  const Eigen::Vector3d n = node.plane.normal.cast<double>();
-  const double d = node.plane.distance(group.mean);
+// Walks with up to `together` points from their root voxels down, all of them one step at a time, and asks for what the next step will
+// read. stop(i, index) ends the walk of point i at the node. Inlined by order: g++ 12 takes a function that only prefetches for one without
+// effect, and drops the call.
+template <std::size_t first_line, class Stop>
+[[gnu::always_inline]] inline void VoxelMap::walk_in_step(std::span<const Leaf> leaves, Stop&& stop) const {
+  std::array<std::uint32_t, together> at;
+  const auto prefetch_node = [this](std::uint32_t index) __attribute__((always_inline)) {
+    const char* node = reinterpret_cast<const char*>(&nodes_[index]);
+    __builtin_prefetch(node + 64 * first_line);
+    __builtin_prefetch(node + 64 * (first_line + 1));
+  };
+  for (const Leaf& leaf : leaves) roots_.prefetch(root_key(leaf));
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    at[i] = roots_.find(root_key(leaves[i]));
+    if (at[i] != none) prefetch_node(at[i]);
+  }
+  for (int level = 0;; ++level) {
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      if (at[i] == none) continue;
+      const std::uint32_t table = nodes_[at[i]].children;
+      if (stop(i, at[i]) || table == none) {
+        at[i] = none;
+      } else {
+        __builtin_prefetch(&children_[table]);
+      }
+    }
+    if (level == depth) return;
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      if (at[i] == none) continue;
+      at[i] = children_[nodes_[at[i]].children][octant(leaves[i], level)];
+      if (at[i] != none) prefetch_node(at[i]);
+    }
+  }
+}
+
+void VoxelMap::first_planes(std::span<const Eigen::Vector3d> points, std::span<Match> out) const {
+  std::array<Leaf, together> leaves;
+  for (std::size_t first = 0; first < points.size(); first += together) {
+    const std::size_t count = std::min(together, points.size() - first);
+    for (std::size_t i = 0; i < count; ++i) {
+      leaves[i] = leaf_of(points[first + i]);
+      out[first + i] = {};
+    }
+    walk_in_step<0>({leaves.data(), count}, [&](std::size_t i, std::uint32_t index) {
+      const Node& node = nodes_[index];
+      if (node.is_plane) out[first + i] = {&node.plane, index, node.epoch};
+      return node.is_plane;
+    });
+  }
+}
+
+bool VoxelMap::explains(const Plane& plane, const PointGroup& group) {
+  const Eigen::Vector3d n = plane.normal.cast<double>();
+  const double d = plane.distance(group.mean);
   const double variance =
-      n.dot(group.noise * n) / group.count + static_cast<double>(node.plane.roughness_variance) + node.plane.variance_at(group.mean);
+      n.dot(group.noise * n) / group.count + static_cast<double>(plane.roughness_variance) + plane.variance_at(group.mean);
   return d * d < settled_sigmas * settled_sigmas * variance;
 }
 
@@ -78,15 +125,29 @@ void VoxelMap::refit_if_due(Node& node, const Eigen::Vector3d& origin) {
 }
 
 void VoxelMap::insert(std::span<const PointGroup> groups, std::uint32_t epoch) {
-  for (const PointGroup& g : groups) {
-    constexpr double farthest = 1e5;  // m; what is beyond is no place a robot walks to, and would leave the key's bits
-    if (g.count > 0 && (g.mean.array().abs() < farthest).all()) insert_one(g, epoch);
+  constexpr double farthest = 1e5;  // m; what is beyond is no place a robot walks to, and would leave the key's bits
+  const auto usable = [&](const PointGroup& g) { return g.count > 0 && (g.mean.array().abs() < farthest).all(); };
+  std::array<const PointGroup*, together> next;
+  std::array<std::uint32_t, together> roots;
+  std::array<Leaf, together> leaves;
+  for (std::size_t first = 0; first < groups.size(); first += together) {
+    std::size_t count = 0;
+    for (const PointGroup& g : groups.subspan(first, std::min(together, groups.size() - first))) {
+      if (!usable(g)) continue;
+      leaves[count] = leaf_of(g.mean);
+      next[count++] = &g;
+    }
+    // Of this walk only the root is kept; the rest is there to have the nodes at hand.
+    std::fill_n(roots.begin(), count, none);
+    walk_in_step<1>({leaves.data(), count}, [&](std::size_t i, std::uint32_t index) {
+      if (roots[i] == none) roots[i] = index;
+      return is_settled(nodes_[index]);
+    });
+    for (std::size_t i = 0; i < count; ++i) insert_one(*next[i], leaves[i], roots[i], epoch);
   }
 }
 
-void VoxelMap::insert_one(const PointGroup& group, std::uint32_t epoch) {
-  const VoxelKey key = root_key(group.mean);
-  std::uint32_t index = roots_.find(key);
+void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32_t root, std::uint32_t epoch) {
   const auto new_node = [this, epoch] {
     const std::uint32_t i = nodes_.take();
     nodes_[i] = Node{};
@@ -94,19 +155,20 @@ void VoxelMap::insert_one(const PointGroup& group, std::uint32_t epoch) {
     ++node_count_;
     return i;
   };
+  const VoxelKey key = root_key(leaf);
+  // A root that was not there before may have come with the group before this one.
+  std::uint32_t index = root == none ? roots_.find(key) : root;
   if (index == none) {
     index = new_node();
     roots_.insert(key, index);
     keys_.push_back(key);
   }
-  const Eigen::Vector3d origin = root_centre(group.mean);
-  Eigen::Vector3d centre = origin;
-  double quarter = config_.voxel_size / 4;
+  const Eigen::Vector3d origin = root_centre(leaf);
   bool above_is_plane = false;
   for (int level = 0;; ++level) {
     Node& node = nodes_[index];
-    const bool settled = node.is_plane && node.moments.count() >= config_.full_points;
-    if (settled_and_explains(node, group)) return;
+    const bool settled = is_settled(node);
+    if (settled && explains(node.plane, group)) return;
     if (!settled) {
       node.moments.add(group, origin);
       // Below a plane the moments are kept, for the day it is none any more, but nothing is fitted.
@@ -119,10 +181,7 @@ void VoxelMap::insert_one(const PointGroup& group, std::uint32_t epoch) {
       children_[table].fill(none);
       node.children = table;
     }
-    const unsigned o = octant(group.mean, centre);
-    centre = child_centre(centre, o, quarter);
-    quarter *= 0.5;
-    std::uint32_t& child = children_[node.children][o];
+    std::uint32_t& child = children_[node.children][octant(leaf, level)];
     if (child == none) child = new_node();
     index = child;
   }
