@@ -1,6 +1,7 @@
 #include "kilvo/lidar/point_to_plane.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "kilvo/lidar/point_noise.hpp"
@@ -17,15 +18,28 @@ constexpr double robust_sigmas = 1.5;
 // The thickness test needs a few points to say anything.
 constexpr float thickness_min_count = 4;
 
-}  // namespace
+// Points looked up at once.
+constexpr std::size_t block = 256;
 
-PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, const Eigen::Vector3d& n_W, const Eigen::Vector3d& q_W) {
+// The row of a plane through q_W with the normal n_W = R n_I under the point p_I, which is x_W in the world.
+inline PointToPlaneRow row_of(const Eigen::Vector3d& p_I, const Eigen::Vector3d& x_W, const Eigen::Vector3d& n_I,
+                              const Eigen::Vector3d& n_W, const Eigen::Vector3d& q_W) {
   PointToPlaneRow row;
-  const Eigen::Vector3d n_I = T_WI.R.matrix().transpose() * n_W;
-  row.r = n_W.dot(T_WI * p_I - q_W);
+  row.r = n_W.dot(x_W - q_W);
   row.J.head<3>() = p_I.cross(n_I);
   row.J.tail<3>() = n_W;
   return row;
+}
+
+// A += w g g'. Of symmetric sums only the lower triangles are read, but whole columns are faster.
+inline void add_outer(Eigen::Matrix<double, 6, 6>& A, const Eigen::Matrix<double, 6, 1>& g, double w) {
+  for (int j = 0; j < 6; ++j) A.col(j) += (w * g[j]) * g;
+}
+
+}  // namespace
+
+PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, const Eigen::Vector3d& n_W, const Eigen::Vector3d& q_W) {
+  return row_of(p_I, T_WI * p_I, T_WI.R.matrix().transpose() * n_W, n_W, q_W);
 }
 
 LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL,
@@ -36,21 +50,22 @@ LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> cluste
       map_error_(map_error),
       config_(config),
       workers_(workers),
+      places_(clusters.size()),
       associations_(clusters.size()),
       rows_of_node_(map.node_capacity(), 0) {}
 
-bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P,
-                        Association& out) const {
+bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluster, const Iterate& at, Association& out) const {
   const Plane& plane = *match.plane;
   const Eigen::Vector3d p_I = cluster.mean.cast<double>();
+  const Eigen::Vector3d x_W = at.T_WI * p_I;
   const Eigen::Vector3d n_W = plane.normal.cast<double>();
-  const PointToPlaneRow row = point_to_plane(T_WI, p_I, n_W, plane.centre);
-  const Eigen::Vector3d n_I = T_WI.R.matrix().transpose() * n_W;
+  const Eigen::Vector3d n_I = at.T_WI.R.matrix().transpose() * n_W;
+  const PointToPlaneRow row = row_of(p_I, x_W, n_I, n_W, plane.centre);
   const double sensor = point_noise_along(n_I, p_I - p_IL_, config_);
   const double rough = static_cast<double>(plane.roughness_variance);
   const double variance = sensor / static_cast<double>(cluster.count) + rough;
-  const double plane_variance = plane.variance_at(T_WI * p_I);
-  const double gate = variance + plane_variance + row.J.dot(P * row.J);
+  const double plane_variance = plane.variance_at(x_W);
+  const double gate = variance + plane_variance + row.J.dot(at.P * row.J);
   if (row.r * row.r > config_.gate * config_.gate * gate) return false;
   if (cluster.count >= thickness_min_count) {
     const Eigen::Vector3f n = n_I.cast<float>();
@@ -61,26 +76,46 @@ bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluste
   return true;
 }
 
-LidarModel::Association LidarModel::associate(const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P, int& rejected) const {
+// A cluster that is still in the leaf where the last iterate put it finds the same there.
+void LidarModel::find_places(std::size_t first, std::size_t last, const SE3& T_WI) {
+  std::array<Eigen::Vector3d, block> points;
+  std::array<std::size_t, block> wanted;
+  std::array<VoxelMap::Match, block> found;
+  std::size_t count = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    const Eigen::Vector3d x = T_WI * clusters_[i].mean.cast<double>();
+    const VoxelKey leaf = map_.leaf_key(x);
+    if (!first_ && leaf == places_[i].leaf) continue;
+    places_[i].leaf = leaf;
+    points[count] = x;
+    wanted[count++] = i;
+  }
+  map_.first_planes({points.data(), count}, {found.data(), count});
+  for (std::size_t k = 0; k < count; ++k) places_[wanted[k]].plane = found[k];
+}
+
+LidarModel::Association LidarModel::associate(std::size_t i, const Iterate& at, int& rejected) const {
+  const PointCluster& cluster = clusters_[i];
   Association found;
+  const VoxelMap::Match& place = places_[i].plane;
+  if (place.plane != nullptr && accept(place, cluster, at, found)) return found;
   bool seen = false;
   const auto try_at = [&](const Eigen::Vector3d& x) {
     return map_.visit_planes(x, [&](const VoxelMap::Match& m) {
       seen = true;
-      return accept(m, cluster, T_WI, P, found);
+      return accept(m, cluster, at, found);
     });
   };
-  const Eigen::Vector3d x = T_WI * cluster.mean.cast<double>();
-  if (try_at(x)) return found;
-  if (seen) {
-    // Its own voxels hold a surface, and it is another one: no business of the neighbours.
-    ++rejected;
+  const Eigen::Vector3d x = at.T_WI * cluster.mean.cast<double>();
+  if (place.plane != nullptr) {
+    // Its own voxels hold a surface. If it is another one, at every depth, it is no business of the neighbours.
+    rejected += try_at(x) ? 0 : 1;
     return found;
   }
   // Nothing known here yet: the nearest neighbour leaf, across the face that the point is closest to.
   const double leaf = map_.leaf_size();
   Eigen::Vector3d offset;
-  for (int i = 0; i < 3; ++i) offset[i] = x[i] - (static_cast<double>(fast_floor(x[i] / leaf)) + 0.5) * leaf;
+  for (int k = 0; k < 3; ++k) offset[k] = x[k] - (static_cast<double>(fast_floor(x[k] / leaf)) + 0.5) * leaf;
   int axis = 0;
   offset.cwiseAbs().maxCoeff(&axis);
   Eigen::Vector3d beside = x;
@@ -114,7 +149,7 @@ void LidarModel::add_row(std::size_t i, const SE3& T_WI, Sums& sums) {
   const double variance = a.variance + rows_of_node_[a.node] * a.plane_variance;
   const double z = std::abs(a.row.r) / std::sqrt(a.variance + a.plane_variance);
   a.weight = (z > robust_sigmas ? robust_sigmas / z : 1.0) / variance;
-  sums.A.selfadjointView<Eigen::Lower>().rankUpdate(a.row.J, a.weight);
+  add_outer(sums.A, a.row.J, a.weight);
   sums.b += a.weight * a.row.r * a.row.J;
   sums.chi2 += a.weight * a.row.r * a.row.r;
   ++sums.rows;
@@ -125,18 +160,18 @@ void LidarModel::add_row(std::size_t i, const SE3& T_WI, Sums& sums) {
     Eigen::Matrix<double, 6, 1> g;
     g.tail<3>() = axis.cast<double>();
     g.head<3>() = p_I.cross(T_WI.R.matrix().transpose() * g.tail<3>());
-    sums.fake.selfadjointView<Eigen::Lower>().rankUpdate(g, a.weight * static_cast<double>(tilt));
+    add_outer(sums.fake, g, a.weight * static_cast<double>(tilt));
   }
 }
 
 Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   const SE3 T_WI = x.pose();
-  const PoseCovariance P = prior.topLeftCorner<6, 6>() + map_error_;
-  constexpr std::size_t block = 256;
+  const Iterate at{T_WI, prior.topLeftCorner<6, 6>() + map_error_};
   report_.clusters = static_cast<int>(clusters_.size());
   report_.rejected = workers_.sum(clusters_.size(), block, 0, [&](std::size_t first, std::size_t last) {
     int rejected = 0;
-    for (std::size_t i = first; i < last; ++i) associations_[i] = associate(clusters_[i], T_WI, P, rejected);
+    find_places(first, last, T_WI);
+    for (std::size_t i = first; i < last; ++i) associations_[i] = associate(i, at, rejected);
     return rejected;
   });
   for (const Association& a : associations_) {
@@ -171,7 +206,7 @@ std::vector<EpochInformation> LidarModel::by_epoch() const {
     if (a.plane == nullptr) continue;
     auto it = std::find_if(out.begin(), out.end(), [&a](const EpochInformation& e) { return e.epoch == a.epoch; });
     if (it == out.end()) it = out.insert(out.end(), EpochInformation{a.epoch});
-    it->A.selfadjointView<Eigen::Lower>().rankUpdate(a.row.J, a.weight);
+    add_outer(it->A, a.row.J, a.weight);
   }
   const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
   for (EpochInformation& e : out) {

@@ -62,8 +62,19 @@ class LidarModel {
   };
 
   struct Sums;
-  Association associate(const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P, int& rejected) const;
-  bool accept(const VoxelMap::Match& match, const PointCluster& cluster, const SE3& T_WI, const PoseCovariance& P, Association& out) const;
+  // Where a cluster fell the last time, and what was there.
+  struct Place {
+    VoxelKey leaf = 0;
+    VoxelMap::Match plane;
+  };
+  // An iterate, and the gate's covariance there.
+  struct Iterate {
+    SE3 T_WI;
+    PoseCovariance P;
+  };
+  void find_places(std::size_t first, std::size_t last, const SE3& T_WI);
+  Association associate(std::size_t i, const Iterate& at, int& rejected) const;
+  bool accept(const VoxelMap::Match& match, const PointCluster& cluster, const Iterate& at, Association& out) const;
   void add_row(std::size_t i, const SE3& T_WI, Sums& sums);
 
   const VoxelMap& map_;
@@ -72,6 +83,7 @@ class LidarModel {
   PoseCovariance map_error_;
   LidarConfig config_;
   const Workers& workers_;
+  std::vector<Place> places_;
   std::vector<Association> associations_;
   std::vector<std::uint16_t> rows_of_node_;
   bool first_ = true;
