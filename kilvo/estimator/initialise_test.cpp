@@ -1,0 +1,100 @@
+#include "kilvo/estimator/initialise.hpp"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <numbers>
+
+namespace kilvo {
+namespace {
+
+// Feeds a constant sample (plus `shake` on the gyro) at 200 Hz until there is a start; gives up after `patience` seconds.
+std::optional<Start> start_from(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel, double shake = 0, double patience = 5,
+                                bool align = true) {
+  Initialiser initialiser(InitialConfig{}, align);
+  for (int i = 0; i < 200 * patience; ++i) {
+    ImuSample s;
+    s.t = time_from_ns(0) + Duration(5'000'000LL * i);
+    s.gyro = gyro + Eigen::Vector3d(shake * std::sin(0.3 * i), 0, 0);
+    s.accel = accel;
+    if (auto start = initialiser.add(s)) return start;
+  }
+  return std::nullopt;
+}
+
+TEST(Level, KeepsTheHeadingOfAnUprightImu) {
+  const SO3 R = level({0, 0, 1});
+  EXPECT_LT((R.matrix() - Eigen::Matrix3d::Identity()).norm(), 1e-12);
+}
+
+TEST(Level, AnImuThatHangsUpsideDownStartsWithARollOfHalfATurn) {
+  const SO3 R = level({0, 0, -1});
+  EXPECT_LT((R.matrix() - Eigen::Vector3d(1, -1, -1).asDiagonal().toDenseMatrix()).norm(), 1e-12);
+}
+
+TEST(Level, PutsXOfTheWorldAlongTheHorizontalPartOfX) {
+  const SO3 R = level(Eigen::Vector3d(0.3, -0.2, 0.9));
+  const Eigen::Vector3d x_W = R * Eigen::Vector3d::UnitX();
+  EXPECT_NEAR(x_W.y(), 0, 1e-12);
+  EXPECT_GT(x_W.x(), 0);
+  EXPECT_LT((R * Eigen::Vector3d(0.3, -0.2, 0.9).normalized() - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+}
+
+TEST(Level, TakesTheYAxisWhenXIsVertical) {
+  const SO3 R = level(Eigen::Vector3d(1, 0.05, 0.05));
+  const Eigen::Vector3d y_W = R * Eigen::Vector3d::UnitY();
+  EXPECT_NEAR(y_W.y(), 0, 1e-12);
+  EXPECT_GT(y_W.x(), 0.9);
+}
+
+TEST(Initialiser, StartsAtTheFirstSampleOfHalfASecondAtRest) {
+  const auto start = start_from({0.002, -0.001, 0.003}, {0, 0, 9.9});
+  ASSERT_TRUE(start);
+  EXPECT_TRUE(start->still);
+  EXPECT_EQ(start->estimate.t, time_from_ns(0));
+  EXPECT_LT((start->estimate.x.bg - Eigen::Vector3d(0.002, -0.001, 0.003)).norm(), 1e-12);
+  EXPECT_NEAR(start->estimate.x.ba.z(), 9.9 - standard_gravity, 1e-12) << "the resting norm is bias, not scale";
+  EXPECT_EQ(start->accel_scale, 1.0);
+}
+
+TEST(Initialiser, DetectsAnAccelerometerInG) {
+  const auto start = start_from(Eigen::Vector3d::Zero(), {0, 0, -1.01});
+  ASSERT_TRUE(start);
+  EXPECT_EQ(start->accel_scale, standard_gravity);
+  EXPECT_NEAR(start->estimate.x.ba.norm(), 0.01 * standard_gravity, 1e-9);
+}
+
+TEST(Initialiser, AtRestTheTiltOfGravityAndTheAccelerometerBiasAreOneUnknown) {
+  const auto start = start_from(Eigen::Vector3d::Zero(), {0, 0, 9.80665});
+  ASSERT_TRUE(start);
+  const Covariance& P = start->estimate.P;
+  EXPECT_NEAR(P(at::g, at::g), 0.05 * 0.05, 1e-9);
+  EXPECT_NEAR(P(at::ba, at::g) / std::sqrt(P(at::ba, at::ba) * P(at::g, at::g)), 1, 1e-3);
+  EXPECT_LT(P(at::g + 2, at::g + 2), 1e-9) << "its length is known";
+  EXPECT_EQ(Eigen::LLT<Covariance>(P).info(), Eigen::Success);
+  EXPECT_LT(P(at::R, at::R), 1e-9) << "the world is fixed by the first pose";
+}
+
+TEST(Initialiser, RefusesMotionAndThenStartsMovingWithWideUncertainties) {
+  EXPECT_FALSE(start_from(Eigen::Vector3d::Zero(), {0, 0, 9.8}, 0.5, 2.9));
+  const auto start = start_from(Eigen::Vector3d::Zero(), {0, 0, 9.8}, 0.5);
+  ASSERT_TRUE(start);
+  EXPECT_FALSE(start->still);
+  EXPECT_GE(start->estimate.t, time_from_ns(2'990'000'000));
+  EXPECT_GE(start->estimate.P(at::v, at::v), 1.0);
+}
+
+TEST(Initialiser, WithoutGravityAlignmentTheWorldIsTheFirstImuFrame) {
+  const auto start = start_from(Eigen::Vector3d::Zero(), {0, 5.0, 8.4}, 0, 5, false);
+  ASSERT_TRUE(start);
+  EXPECT_LT((start->estimate.x.R.matrix() - Eigen::Matrix3d::Identity()).norm(), 1e-15);
+  EXPECT_NEAR(start->estimate.x.g.norm(), standard_gravity, 1e-12);
+  EXPECT_LT(start->estimate.x.g.y(), -4.9);
+}
+
+TEST(Initialiser, SaysWhatItWaitsFor) {
+  const Initialiser initialiser(InitialConfig{}, true);
+  EXPECT_NE(initialiser.waiting_for().find("first IMU sample"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace kilvo

@@ -1,0 +1,93 @@
+#include "kilvo/estimator/timeline.hpp"
+
+#include <gtest/gtest.h>
+
+namespace kilvo {
+namespace {
+
+constexpr std::array<bool, sensor_count> imu_and_lidar = {true, false, true, false};
+
+ImuSample imu_at(double s) {
+  ImuSample m;
+  m.t = time_from_ns(0) + from_seconds(s);
+  return m;
+}
+
+LidarScan scan_from(double s, double length) {
+  LidarScan m;
+  m.t = time_from_ns(0) + from_seconds(s);
+  m.points.resize(2);
+  m.points[1].offset_ns = static_cast<std::int32_t>(length * 1e9);
+  return m;
+}
+
+std::vector<double> all_from(Timeline& timeline) {
+  std::vector<double> out;
+  while (auto m = timeline.pop()) out.push_back(to_seconds(completion_of(*m).time_since_epoch()));
+  return out;
+}
+
+TEST(Timeline, AScanIsCompleteAtItsLastPointWhateverTheirOrder) {
+  LidarScan scan = scan_from(1.0, 0.1);
+  std::swap(scan.points[0], scan.points[1]);
+  EXPECT_EQ(completion_of(scan), time_from_ns(1'100'000'000));
+  EXPECT_EQ(begin_of(scan), time_from_ns(1'000'000'000));
+}
+
+TEST(Timeline, ReleasesInOrderOfCompletionOnceBothSensorsAreBeyond) {
+  Timeline timeline(imu_and_lidar, from_seconds(10));
+  EXPECT_FALSE(timeline.push(imu_at(1.000)));
+  EXPECT_FALSE(timeline.push(imu_at(1.095)));
+  EXPECT_TRUE(all_from(timeline).empty()) << "the LiDAR has not been heard";
+  EXPECT_FALSE(timeline.push(scan_from(0.99, 0.1)));
+  EXPECT_EQ(all_from(timeline), (std::vector<double>{1.0, 1.09})) << "nothing is known of the LiDAR beyond 1.09";
+  EXPECT_FALSE(timeline.push(scan_from(1.09, 0.1)));
+  EXPECT_EQ(all_from(timeline), (std::vector<double>{1.095}));
+}
+
+TEST(Timeline, WaitsForASilentSensorNoLongerThanMaxWait) {
+  Timeline timeline(imu_and_lidar, from_seconds(0.2));
+  for (int i = 0; i <= 30; ++i) EXPECT_FALSE(timeline.push(imu_at(1.0 + 0.01 * i)));
+  const auto released = all_from(timeline);
+  ASSERT_EQ(released.size(), 11u);
+  EXPECT_DOUBLE_EQ(released.back(), 1.1);
+}
+
+TEST(Timeline, SortsSwappedNeighbours) {
+  Timeline timeline({true, false, false, false}, from_seconds(0.2));
+  timeline.push(imu_at(1.0));
+  Timeline waiting(imu_and_lidar, from_seconds(0.2));
+  for (const double s : {1.0, 1.02, 1.01, 1.03}) EXPECT_FALSE(waiting.push(imu_at(s)));
+  waiting.end();
+  EXPECT_EQ(all_from(waiting), (std::vector<double>{1.0, 1.01, 1.02, 1.03}));
+}
+
+TEST(Timeline, RefusesDuplicatesAndWhatIsOlderThanWhatIsOut) {
+  Timeline timeline({true, false, false, false}, from_seconds(0.2));
+  EXPECT_FALSE(timeline.push(imu_at(1.0)));
+  EXPECT_EQ(timeline.push(imu_at(1.0)), "duplicate");
+  EXPECT_EQ(all_from(timeline).size(), 1u);
+  EXPECT_EQ(timeline.push(imu_at(0.5)), "late");
+}
+
+TEST(Timeline, OneStampFarAheadIsDroppedAndHurtsNobody) {
+  Timeline timeline({true, false, false, false}, from_seconds(0.2));
+  EXPECT_FALSE(timeline.push(imu_at(1.0)));
+  EXPECT_FALSE(timeline.push(imu_at(3601.0)));
+  EXPECT_FALSE(timeline.push(imu_at(1.005)));
+  EXPECT_EQ(timeline.take_jumped(), std::vector<Sensor>{Sensor::imu});
+  const auto released = all_from(timeline);
+  ASSERT_EQ(released.size(), 2u);
+  EXPECT_NEAR(released[1], 1.005, 1e-9);
+}
+
+TEST(Timeline, ARecordingThatWasPausedGoesOnWithoutALoss) {
+  Timeline timeline({true, false, false, false}, from_seconds(0.2));
+  EXPECT_FALSE(timeline.push(imu_at(1.0)));
+  for (int i = 0; i < 12; ++i) EXPECT_FALSE(timeline.push(imu_at(60.0 + 0.005 * i)));
+  EXPECT_EQ(all_from(timeline).size(), 13u);
+  EXPECT_TRUE(timeline.take_jumped().empty());
+}
+
+}  // namespace
+}  // namespace kilvo
