@@ -27,8 +27,6 @@ int parse_and_do(const std::vector<std::string>& words) {
   program.set_version_flag("--version", "kilvo " KILVO_VERSION, "the program's version");
   program.require_subcommand(0, 1);
   program.get_formatter()->label("SUBCOMMAND", "VERB");
-  program.footer(
-      "Each verb has its own: kilvo VERB --help\nExit codes: 0 done, 1 the run failed, 2 wrong usage or configuration, 3 unusable input");
   Action chosen;
   add_run(program, chosen);
   add_info(program, chosen);
@@ -36,6 +34,8 @@ int parse_and_do(const std::vector<std::string>& words) {
   add_config(program, chosen);
   add_demo(program, chosen);
   for (CLI::App* verb : program.get_subcommands({})) verb->group("Verbs");
+  program.footer(
+      "Each verb has its own: kilvo VERB --help\nExit codes: 0 done, 1 the run failed, 2 wrong usage or configuration, 3 unusable input");
   check_words(words, program);
   try {
     program.parse(std::vector<std::string>(words.rbegin(), words.rend()));

@@ -126,7 +126,7 @@ class Run {
 
   std::string failure(bool interrupted) const {
     const Recap& recap = files_.recap();
-    const bool with_lidar = source_.topic(Sensor::lidar) != "";
+    const bool with_lidar = !source_.topic(Sensor::lidar).empty();
     if (interrupted) return "stopped by the user";
     if (recap.outputs() == 0) {
       const std::string why = estimator_.waiting_for();

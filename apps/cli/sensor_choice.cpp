@@ -107,8 +107,8 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
   std::vector<std::string> missing;
   for (const Sensor sensor : every_sensor) {
     if (!settings.has(sensor)) continue;
-    const std::string& topic = settings.topic(sensor);
-    const bool present = std::ranges::any_of(topics, [&](const std::string& name) { return lab::topic_matches(sensor, topic, name); });
+    const std::string& pattern = settings.topic(sensor);
+    const bool present = std::ranges::any_of(topics, [&](const std::string& topic) { return lab::topic_matches(sensor, pattern, topic); });
     any_present = any_present || present;
     more_configured = more_configured || sensor != Sensor::imu;
     if (present && is_supported(sensor)) {
@@ -117,7 +117,7 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
       out.notes.push_back(unsupported(sensor));
     } else {
       const std::vector<std::string> names(topics.begin(), topics.end());
-      missing.push_back(fmt::format("no topic {} ({}), nearest is {}", topic, name_of(sensor), lab::nearest(topic, names)));
+      missing.push_back(fmt::format("no topic {} ({}), nearest is {}", pattern, name_of(sensor), lab::nearest(pattern, names)));
       out.warnings.push_back(missing.back());
     }
   }

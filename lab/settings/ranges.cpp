@@ -73,7 +73,7 @@ const std::map<std::string_view, Range>& ranges() {
 
 std::string Range::text() const {
   if (low == -any) return high == any ? "any" : fmt::format("at most {}", high);
-  const std::string lower = fmt::format("{} {}", without_low ? "above" : "at least", low);
+  std::string lower = fmt::format("{} {}", without_low ? "above" : "at least", low);
   if (high == any) return lower;
   return without_low ? fmt::format("{}, at most {}", lower, high) : fmt::format("{} to {}", low, high);
 }

@@ -24,7 +24,7 @@ std::string shown(const YAML::Node& node) {
   if (node.IsNull()) return "nothing";
   if (node.IsMap()) return "a map";
   if (node.IsSequence()) return fmt::format("a list of {}", node.size());
-  const std::string text = node.Scalar();
+  const std::string& text = node.Scalar();
   constexpr std::size_t most = 60;
   return "'" + (text.size() > most ? text.substr(0, most) + "..." : text) + "'";
 }

@@ -1,9 +1,9 @@
 #include "tests/cli/program.hpp"
 
+#include <csignal>
 #include <cstdlib>
 #include <fcntl.h>
 #include <fstream>
-#include <signal.h>
 #include <stdexcept>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -33,6 +33,7 @@ Started::Started(const std::vector<std::string>& words, const fs::path& program)
   std::vector<std::string> copy{program.string()};
   copy.insert(copy.end(), words.begin(), words.end());
   std::vector<char*> arguments;
+  arguments.reserve(copy.size() + 1);
   for (std::string& word : copy) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   pid_ = ::fork();

@@ -1,6 +1,5 @@
 // kilvo run, when all is well, and what its options do.
-#include <signal.h>
-#include <sstream>
+#include <csignal>#include <sstream>
 
 #include "lab/mapping/ply.hpp"
 #include "tests/cli/story.hpp"
@@ -162,9 +161,11 @@ TEST_F(Run, ResultsOfAnEarlierRunAreReplaced) {
 }
 
 TEST_F(Run, CtrlCWritesWhatIsThere) {
+  constexpr std::int64_t samples = 400000, period_ns = 5'000'000;
   std::vector<Measurement> long_rest;
-  for (int i = 0; i < 400000; ++i)
-    long_rest.push_back(ImuSample{time_from_ns(1'700'000'000'000'000'000 + i * 5'000'000L), {0, 0, 0}, {0, 0, 9.8}});
+  long_rest.reserve(samples);
+  for (std::int64_t i = 0; i < samples; ++i)
+    long_rest.emplace_back(ImuSample{walk.truth.front().t + Duration(i * period_ns), {0, 0, 0}, {0, 0, 9.8}});
   record(long_rest);
   Started program({"run", recording(), "--config", config(), "--out", out(), "--sensors", "imu"});
   wait_for_content(folder / "out/odometry.tum");
