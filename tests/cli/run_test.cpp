@@ -1,5 +1,6 @@
 // kilvo run, when all is well, and what its options do.
-#include <csignal>#include <sstream>
+#include <csignal>
+#include <sstream>
 
 #include "lab/mapping/ply.hpp"
 #include "tests/cli/story.hpp"
