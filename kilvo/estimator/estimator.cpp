@@ -257,7 +257,13 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   constexpr double to_leave = 3.0;
   if (degenerate_) lidar.weak_share *= to_leave;
   LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar, workers_);
-  estimate_ = map_.empty() ? prior : update(prior, model, config_.update).posterior;
+  const PoseCovariance within_scan = undistortion_noise(config_.noise, end - centre);
+  const auto measured = [&](const State& x, const Covariance& P) {
+    Information<6> info = model(x, P);
+    add_common_noise(within_scan, info);
+    return info;
+  };
+  estimate_ = map_.empty() ? prior : update(prior, measured, config_.update).posterior;
   const bool good = keep_finite();
   StageTimes stages;
   stages.lidar_us = watch.lap_us();

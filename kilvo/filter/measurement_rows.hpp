@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 
@@ -28,6 +29,15 @@ struct Information {
   double chi2 = 0;  // sum r' R^-1 r
   int rows = 0;
 };
+
+/// Adds noise of covariance V that all rows share: (A^-1 + V)^-1 = (I + A V)^-1 A, with A that may be singular.
+template <int N>
+void add_common_noise(const Eigen::Matrix<double, N, N>& V, Information<N>& info) {
+  const auto common = (Eigen::Matrix<double, N, N>::Identity() + info.A * V).partialPivLu();
+  const Eigen::Matrix<double, N, N> A = common.solve(info.A);
+  info.A = 0.5 * (A + A.transpose());
+  info.b = common.solve(info.b).eval();
+}
 
 template <int Max>
 const Rows<Max>& as_rows(const Rows<Max>& rows) {

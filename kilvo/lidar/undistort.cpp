@@ -89,4 +89,13 @@ std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajec
   return out;
 }
 
+PoseCovariance undistortion_noise(const ProcessNoise& noise, Duration half_scan) {
+  // The mean over [0, T] of a random walk has the variance T / 3.
+  const double share = to_seconds(half_scan) / 3;
+  PoseCovariance V = PoseCovariance::Zero();
+  V.diagonal().head<3>().setConstant(share * noise.gyro * noise.gyro);
+  V.diagonal().tail<3>().setConstant(share * noise.velocity * noise.velocity);
+  return V;
+}
+
 }  // namespace kilvo

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "kilvo/filter/predict.hpp"
 #include "kilvo/filter/trajectory.hpp"
 #include "kilvo/sensors/measurement.hpp"
 #include "kilvo/sensors/robot.hpp"
@@ -22,5 +23,9 @@ struct PointDrops {
 /// A scan's points in the IMU frame of time `at`, by their relative motion along `trajectory`; both ends of the scan and `at` should
 /// lie within it. Points without a pose (up to `slack` outside is taken as the end pose) are dropped and counted.
 std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajectory, Time at, const LidarMount& mount, PointDrops& drops);
+
+/// What the IMU's noise within a scan, seen from its middle, does to the pose that its points tell: the mean of a random walk over half
+/// of the scan, for a scanner that turns shows each surface in one half or the other. Of (rotation, position), common to all points.
+PoseCovariance undistortion_noise(const ProcessNoise& noise, Duration half_scan);
 
 }  // namespace kilvo
