@@ -250,7 +250,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   Estimate ahead = prior;
   propagate(ahead, end);
   const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
-  const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size);
+  const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size, config_.lidar.reach());
   const Eigen::Vector3d p_IL = robot_.lidar.T_imu_lidar.p;
   LidarConfig lidar = config_.lidar;
   // With hysteresis: each change of mind would hand what was drifted since to the map.

@@ -1,5 +1,9 @@
 #include "kilvo/lidar/downsample.hpp"
 
+#include <array>
+#include <cmath>
+#include <optional>
+
 #include "kilvo/map/voxel_index.hpp"
 
 namespace kilvo {
@@ -34,7 +38,7 @@ class CellTable {
   }
 
   Cell& cell_of(VoxelKey key, const Eigen::Vector3f& p) {
-    for (std::size_t i = (key * 0x9E3779B97F4A7C15ULL) >> 32 & mask_;; i = (i + 1) & mask_) {
+    for (std::size_t i = home(key);; i = (i + 1) & mask_) {
       if (slots_[i] == empty) {
         slots_[i] = static_cast<std::uint32_t>(cells_.size());
         return cells_.emplace_back(Cell{key, p, Eigen::Vector3f::Zero(), 0, Eigen::Matrix<float, 6, 1>::Zero()});
@@ -43,18 +47,76 @@ class CellTable {
     }
   }
 
+  std::optional<std::uint32_t> find(VoxelKey key) const {
+    for (std::size_t i = home(key); slots_[i] != empty; i = (i + 1) & mask_) {
+      if (cells_[slots_[i]].key == key) return slots_[i];
+    }
+    return std::nullopt;
+  }
+
+  std::vector<Cell>& cells() { return cells_; }
   const std::vector<Cell>& cells() const { return cells_; }
 
  private:
   static constexpr std::uint32_t empty = 0xffffffff;
+  std::size_t home(VoxelKey key) const { return (key * 0x9E3779B97F4A7C15ULL) >> 32 & mask_; }
+
   std::vector<std::uint32_t> slots_;
   std::vector<Cell> cells_;
   std::size_t mask_;
 };
 
+// In cells, in the world.
+Eigen::Vector3d mean_of(const Cell& c, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
+  return R * (c.first + c.sum / c.count).cast<double>() + t;
+}
+
+// Of each cell the index of the cell that its points belong to: itself, or the fuller neighbour across a face, where both their means are
+// within `reach` (in cells) of that face. A surface along a face is cut in two by its noise: the few points beyond would be a cluster of
+// their own, far off the surface, and those that stayed would lean the other way.
+std::vector<std::uint32_t> owners_of(const CellTable& table, const Eigen::Matrix3d& R, const Eigen::Vector3d& t, double reach) {
+  const std::vector<Cell>& cells = table.cells();
+  std::vector<std::uint32_t> owner(cells.size());
+  for (std::uint32_t i = 0; i < cells.size(); ++i) {
+    owner[i] = i;
+    const Eigen::Vector3d w = mean_of(cells[i], R, t);
+    const std::array<std::int64_t, 3> at = {fast_floor(w.x()), fast_floor(w.y()), fast_floor(w.z())};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const int k = static_cast<int>(axis);
+      const double into = w[k] - static_cast<double>(at[axis]);
+      if (into > reach && into < 1 - reach) continue;
+      const std::int64_t side = into > 0.5 ? 1 : -1;
+      auto beside = at;
+      beside[axis] += side;
+      const auto other = table.find(pack_key(beside[0], beside[1], beside[2]));
+      if (!other) continue;
+      const double face = static_cast<double>(side > 0 ? at[axis] + 1 : at[axis]);
+      if (std::abs(mean_of(cells[*other], R, t)[k] - face) > reach) continue;
+      const float best = cells[owner[i]].count;
+      // Fuller, or first among equals: no two own each other.
+      if (cells[*other].count > best || (cells[*other].count == best && *other < owner[i])) owner[i] = *other;
+    }
+  }
+  for (std::uint32_t i = 0; i < cells.size(); ++i) {
+    while (owner[owner[i]] != owner[i]) owner[i] = owner[owner[i]];
+  }
+  return owner;
+}
+
+// The sums of `from`, moved to the first point of `to`.
+void join(const Cell& from, Cell& to) {
+  const Eigen::Vector3f d = from.first - to.first;
+  const auto moved = [&](int i, int j) { return from.sum[i] * d[j] + d[i] * from.sum[j] + from.count * d[i] * d[j]; };
+  Eigen::Matrix<float, 6, 1> shift;
+  shift << moved(0, 0), moved(0, 1), moved(0, 2), moved(1, 1), moved(1, 2), moved(2, 2);
+  to.outer += from.outer + shift;
+  to.sum += from.sum + from.count * d;
+  to.count += from.count;
+}
+
 }  // namespace
 
-std::vector<PointCluster> downsample(std::span<const PointXYZI> points, const SE3& T_WI, double cell) {
+std::vector<PointCluster> downsample(std::span<const PointXYZI> points, const SE3& T_WI, double cell, double reach) {
   CellTable table(points.size());
   const Eigen::Matrix3d R = T_WI.R.matrix() / cell;
   const Eigen::Vector3d t = T_WI.p / cell;
@@ -72,9 +134,16 @@ std::vector<PointCluster> downsample(std::span<const PointXYZI> points, const SE
     c.outer[4] += d.y() * d.z();
     c.outer[5] += d.z() * d.z();
   }
+  std::vector<Cell>& cells = table.cells();
+  const std::vector<std::uint32_t> owner = owners_of(table, R, t, reach / cell);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (owner[i] != i) join(cells[i], cells[owner[i]]);
+  }
   std::vector<PointCluster> out;
-  out.reserve(table.cells().size());
-  for (const Cell& c : table.cells()) out.push_back(cluster_of(c));
+  out.reserve(cells.size());
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (owner[i] == i) out.push_back(cluster_of(cells[i]));
+  }
   return out;
 }
 

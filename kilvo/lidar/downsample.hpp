@@ -21,7 +21,8 @@ struct PointCluster {
   }
 };
 
-/// Groups points (IMU frame) by the cells of the world's grid that they fall into at the pose T_WI; in order of first appearance.
-std::vector<PointCluster> downsample(std::span<const PointXYZI> points, const SE3& T_WI, double cell);
+/// Groups points (IMU frame) by the cells of the world's grid that they fall into at the pose T_WI; in order of first appearance. Two
+/// cells whose means are both within `reach` (m) of their common face become one: a surface along a face is not cut in two by its noise.
+std::vector<PointCluster> downsample(std::span<const PointXYZI> points, const SE3& T_WI, double cell, double reach = 0);
 
 }  // namespace kilvo

@@ -1,6 +1,8 @@
 #include "kilvo/lidar/downsample.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <gtest/gtest.h>
 #include <map>
 
@@ -56,6 +58,30 @@ TEST(Downsample, ClustersComeInTheOrderOfTheirFirstPoints) {
   EXPECT_NEAR(clusters[1].mean.x(), 0.105, 1e-6);
   EXPECT_NEAR(clusters[2].mean.x(), -3, 1e-6);
   EXPECT_EQ(clusters[0].count, 2);
+}
+
+TEST(Downsample, ASurfaceAlongAFaceIsNotCutInTwoByItsNoise) {
+  test::Random random(2);
+  // A floor 1 cm below the face z = 0, with 2 cm of noise: a third of its points are above.
+  std::vector<PointXYZI> points;
+  const auto coordinate = [&random] { return static_cast<float>(random.uniform(-1, 1)); };
+  for (int i = 0; i < 4000; ++i) points.emplace_back(coordinate(), coordinate(), static_cast<float>(-0.01 + random.normal(0.02)), 0.0F);
+  const auto mean_heights = [&points](double reach) {
+    std::vector<double> out;
+    for (const PointCluster& c : downsample(points, SE3{}, 0.25, reach)) out.push_back(c.mean.z());
+    return out;
+  };
+  const auto cut = mean_heights(0), whole = mean_heights(0.06);
+  EXPECT_EQ(cut.size(), 2 * whole.size());
+  for (const double z : whole) EXPECT_NEAR(z, -0.01, 4 * 0.02 / std::sqrt(30.0));
+  EXPECT_GT(*std::max_element(cut.begin(), cut.end()), 0.004);
+}
+
+TEST(Downsample, CellsThatMeetAtAFaceOnlyWithTheirRimsStayApart) {
+  // A wall across the face x = 0.25: the cells' means are in their middles.
+  std::vector<PointXYZI> points;
+  for (int i = 0; i < 100; ++i) points.emplace_back(0.005F * static_cast<float>(i), 0.1F, 0.1F, 0.0F);
+  EXPECT_EQ(downsample(points, SE3{}, 0.25, 0.06).size(), 2U);
 }
 
 TEST(Downsample, OfNothingIsNothingAndOfOnePointThatPoint) {

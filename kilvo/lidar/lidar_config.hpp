@@ -14,6 +14,9 @@ struct LidarConfig {
   double gate = 3.0;
   double weak_share = 0.002;
 
+  /// How far noise carries points of a surface beyond a voxel's face, m.
+  double reach() const { return 3 * range_noise; }
+
   static constexpr auto fields() {
     return std::tuple{Field{"range_noise", &LidarConfig::range_noise, "m", "standard deviation of one measured range"},
                       Field{"angle_noise", &LidarConfig::angle_noise, "rad", "standard deviation of one beam's direction, each way"},

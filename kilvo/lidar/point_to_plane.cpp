@@ -15,6 +15,10 @@ constexpr double thickness_sigmas2 = 6.0;
 // Beyond this many standard deviations a row's pull stays the same (Huber): posters, edges, things that moved.
 constexpr double robust_sigmas = 1.5;
 
+// By how much such weights make the variance of a Gaussian's mean larger than the inverse of their sum (Huber 1964: E[psi^2] E[w] /
+// E[psi']^2).
+constexpr double robust_cost = 1.014;
+
 // The thickness test needs a few points to say anything.
 constexpr float thickness_min_count = 4;
 
@@ -148,7 +152,7 @@ void LidarModel::add_row(std::size_t i, const SE3& T_WI, Sums& sums) {
   // k rows of one plane share its error: each carries k times its variance, so that together they average it not at all.
   const double variance = a.variance + rows_of_node_[a.node] * a.plane_variance;
   const double z = std::abs(a.row.r) / std::sqrt(a.variance + a.plane_variance);
-  a.weight = (z > robust_sigmas ? robust_sigmas / z : 1.0) / variance;
+  a.weight = (z > robust_sigmas ? robust_sigmas / z : 1.0) / (robust_cost * variance);
   add_outer(sums.A, a.row.J, a.weight);
   sums.b += a.weight * a.row.r * a.row.J;
   sums.chi2 += a.weight * a.row.r * a.row.r;

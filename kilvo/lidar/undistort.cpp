@@ -90,7 +90,8 @@ std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajec
 }
 
 PoseCovariance undistortion_noise(const ProcessNoise& noise, Duration half_scan) {
-  // The mean over [0, T] of a random walk has the variance T / 3.
+  // A point at the time t from the middle carries |t| of the random walk: T / 6 for a surface that is seen all the time (both halves
+  // average), T / 2 for one that is seen once. A turning scanner is between.
   const double share = to_seconds(half_scan) / 3;
   PoseCovariance V = PoseCovariance::Zero();
   V.diagonal().head<3>().setConstant(share * noise.gyro * noise.gyro);
