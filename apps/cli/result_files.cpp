@@ -23,7 +23,8 @@ ResultFiles::ResultFiles(const std::filesystem::path& folder)
       sweeps_(folder / "sweeps.tum"),
       states_(folder / "states.csv", state_columns),
       modality_(folder / "modality.csv", "t,modality,cause"),
-      timing_(folder / "timing.csv", "t,stage,microseconds") {}
+      timing_(folder / "timing.csv", "t,stage,microseconds"),
+      folder_(folder) {}
 
 void ResultFiles::write(const Output& output) {
   const lab::StampedPose pose{output.t, output.x.pose()};
@@ -33,7 +34,22 @@ void ResultFiles::write(const Output& output) {
   if (output.is_sweep || (without_lidar && (!last_state_ || output.t - *last_state_ >= state_period))) write_state(output);
   if (output.modality != last_modality_) write_modality(output);
   if (output.is_sweep) write_stages(output);
+  if (output.contacts) write_contacts(output);
   recap_.add(output);
+}
+
+void ResultFiles::write_contacts(const Output& output) {
+  if (!contacts_) contacts_.emplace(folder_ / "contacts.csv", "t,left,right,clearance_left,clearance_right,d_a,d_fv_left,d_fv_right");
+  const Contacts& c = *output.contacts;
+  std::string line, t;
+  lab::append_seconds(t, output.t);
+  fmt::format_to(std::back_inserter(line), "{},{:d},{:d},{:.5f},{:.5f},{:.4g},{:.4g},{:.4g}", t, c.on[0], c.on[1], c.clearance[0],
+                 c.clearance[1], c.d_a, c.d_fv[0], c.d_fv[1]);
+  contacts_->write(line);
+  for (const auto& [stage, microseconds] : {std::pair("kinematic", output.kinematic_us), std::pair("contact", output.contact_us)}) {
+    timing_.write(fmt::format("{},{},{:.1f}", t, stage, microseconds));
+    recap_.stages.add(stage, microseconds);
+  }
 }
 
 void ResultFiles::write_state(const Output& output) {
@@ -53,7 +69,7 @@ void ResultFiles::write_state(const Output& output) {
 void ResultFiles::write_modality(const Output& output) {
   std::string line;
   lab::append_seconds(line, output.t);
-  modality_.write(fmt::format("{},{},{}", line, name_of(output.modality), last_modality_ ? "change of sensors" : "start"));
+  modality_.write(fmt::format("{},{},{}", line, name_of(output.modality), output.cause));
   last_modality_ = output.modality;
 }
 
@@ -74,6 +90,7 @@ void ResultFiles::close() {
   states_.close();
   modality_.close();
   timing_.close();
+  if (contacts_) contacts_->close();
 }
 
 }  // namespace kilvo::cli

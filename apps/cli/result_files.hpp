@@ -25,9 +25,12 @@ class ResultFiles {
   void write_state(const Output& output);
   void write_modality(const Output& output);
   void write_stages(const Output& output);
+  void write_contacts(const Output& output);
 
   lab::TumWriter odometry_, sweeps_;
   CsvFile states_, modality_, timing_;
+  std::filesystem::path folder_;
+  std::optional<CsvFile> contacts_;  // from the first leg sample on
   std::optional<Modality> last_modality_;
   std::optional<Time> last_state_;
   Recap recap_;

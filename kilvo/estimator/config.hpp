@@ -5,6 +5,7 @@
 
 #include "kilvo/filter/predict.hpp"
 #include "kilvo/filter/update.hpp"
+#include "kilvo/legs/leg_config.hpp"
 #include "kilvo/lidar/lidar_config.hpp"
 #include "kilvo/map/voxel_map.hpp"
 #include "kilvo/math/field.hpp"
@@ -45,6 +46,7 @@ struct EstimatorConfig {
   UpdateConfig update;
   MapConfig map;
   LidarConfig lidar;
+  LegConfig legs;
 
   static constexpr auto fields() {
     return std::tuple{

@@ -1,11 +1,8 @@
 #include "kilvo/estimator/estimator.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <stdexcept>
 
-#include "kilvo/lidar/downsample.hpp"
-#include "kilvo/lidar/undistort.hpp"
 
 namespace kilvo {
 namespace {
@@ -16,22 +13,6 @@ constexpr Duration trajectory_length = std::chrono::milliseconds(500);
 constexpr std::size_t max_pending = 20;
 // Before the start, as much as a moving start may need.
 constexpr std::size_t max_before_start = 200000;
-// A walking machine that is faster than this has lost itself.
-constexpr double absurd_speed = 30;  // m/s
-
-class Stopwatch {
- public:
-  double lap_us() {
-    const auto now = std::chrono::steady_clock::now();
-    const double us = std::chrono::duration<double, std::micro>(now - start_).count();
-    start_ = now;
-    return us;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
 // What no sensor measures; nullptr: nothing wrong.
 const char* fault_of(const Measurement& m) {
   constexpr double absurd_gyro = 300, absurd_accel = 5000;  // rad/s, m/s^2 (or g): beyond any IMU's range
@@ -39,19 +20,9 @@ const char* fault_of(const Measurement& m) {
     if (!imu->gyro.allFinite() || !imu->accel.allFinite()) return "not finite";
     if (imu->gyro.norm() > absurd_gyro || imu->accel.norm() > absurd_accel) return "absurd value";
   }
+  if (const auto* joints = std::get_if<JointSample>(&m); joints != nullptr && joints->position.empty()) return "empty";
   if (const auto* scan = std::get_if<LidarScan>(&m); scan != nullptr && scan->points.empty()) return "empty";
   return nullptr;
-}
-
-std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE3& T_WI) {
-  std::vector<PointXYZI> out(points_I.size());
-  const Eigen::Matrix3f R = T_WI.R.matrix().cast<float>();
-  const Eigen::Vector3f p = T_WI.p.cast<float>();
-  for (std::size_t i = 0; i < points_I.size(); ++i) {
-    out[i].head<3>() = R * points_I[i].head<3>() + p;
-    out[i][3] = points_I[i][3];
-  }
-  return out;
 }
 
 }  // namespace
@@ -62,12 +33,16 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       used_(used),
       timeline_(used, from_seconds(config.max_wait)),
       initialiser_(config.initial, config.gravity_align),
+      replay_(config),
       trajectory_(trajectory_length),
       map_(config.map),
-      workers_(config.threads) {
-  if (!used[static_cast<std::size_t>(Sensor::imu)]) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
+      workers_(config.threads),
+      contacts_(config.legs),
+      stances_(config.legs) {
+  if (!uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.leaf_size() * (1 + 1e-9))
     throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
+  if (uses(Sensor::legs)) kinematics_.emplace(robot);
 }
 
 std::vector<Output> Estimator::push(Measurement m) {
@@ -97,15 +72,14 @@ std::vector<Output> Estimator::finish() {
   while (auto next = timeline_.pop()) handle(*next, out);
   // A scan that ends between the last IMU sample and where the next would have been: the last sample is held.
   const Duration period = from_seconds(1.5 / robot_.imu.rate);
-  while (estimate_ && !imu_.empty() && !pending_.empty() && pending_.front().end <= imu_.back().t + period) {
-    const PendingScan next = std::move(pending_.front());
-    pending_.pop_front();
-    if (next.end > imu_.back().t) {
-      imu_.push_back(imu_.back());
-      imu_.back().t = next.end;
-    }
-    process(next.scan, next.end, out);
+  if (estimate_ && replay_.has_imu() && !pending_.empty() && pending_.front().end <= replay_.newest_imu().t + period) {
+    ImuSample held = replay_.newest_imu();
+    held.t = std::max(held.t, pending_.front().end);
+    if (held.t > replay_.newest_imu().t) replay_.add(held);
+    process_pending(held.t, out);
+    if (sweep_ && estimate_->t < held.t) replay_.advance(*estimate_, held.t, trajectory_);
   }
+  if (sweep_) out.push_back(output_now());
   for (std::size_t i = 0; i < pending_.size(); ++i) drop(Sensor::lidar, "no IMU");
   pending_.clear();
   for (const Measurement& m : before_start_) drop(sensor_of(m), "before the start");
@@ -118,6 +92,8 @@ void Estimator::handle(Measurement& m, std::vector<Output>& out) {
     handle_before_start(m, out);
   } else if (auto* imu = std::get_if<ImuSample>(&m)) {
     handle_imu(*imu, out);
+  } else if (const auto* joints = std::get_if<JointSample>(&m)) {
+    handle_legs(*joints, out);
   } else if (auto* scan = std::get_if<LidarScan>(&m)) {
     const Time end = completion_of(m);
     pending_.push_back({std::move(*scan), end});
@@ -144,7 +120,8 @@ void Estimator::handle_before_start(Measurement& m, std::vector<Output>& out) {
 
 void Estimator::begin(const Start& start, std::vector<Output>& out) {
   accel_scale_ = start.accel_scale;
-  estimate_ = anchor_ = start.estimate;
+  estimate_ = anchor_ = closed_ = start.estimate;
+  last_sweep_ = start.estimate.t;
   trajectory_.push(estimate_->t, estimate_->x.pose(), estimate_->x.v);
   if (!start.still) statistics_.warnings.push_back("the robot did not stand still: started on the move, with wide uncertainties");
   const double norm = start.resting_norm * start.accel_scale;
@@ -164,56 +141,6 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   }
 }
 
-// The closed interval [begin, end] between two samples; when nobody saw the motion in between, with noise that says so.
-ImuInterval Estimator::interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const {
-  ImuInterval interval = ImuInterval::between(a, b, begin, end);
-  const double gap = to_seconds(b.t - a.t);
-  if (gap <= config_.max_imu_gap) return interval;
-  constexpr double unknown_accel = 3.0;  // m/s^2, constant over the gap: as a density, times the gap
-  interval.noise_scale = unknown_accel * unknown_accel * gap / (config_.noise.accel * config_.noise.accel);
-  constexpr double blind = 1.0;  // s; after longer than this the two samples say nothing of the time between
-  if (gap > blind) {
-    interval.gyro_begin = interval.gyro_end = x.bg;
-    interval.accel_begin = interval.accel_end = x.ba - x.R.inverse() * x.g;
-  }
-  return interval;
-}
-
-void Estimator::propagate(Estimate& e, Time until) {
-  // The sample at or before e.t.
-  auto next = std::upper_bound(imu_.begin(), imu_.end(), e.t, [](Time t, const ImuSample& s) { return t < s.t; });
-  while (e.t < until && next != imu_.end()) {
-    const ImuSample& a = next == imu_.begin() ? *next : *(next - 1);
-    const Time end = std::min(until, next->t);
-    e = predict(e, interval_between(a, *next, e.t, end, e.x), {}, config_.noise);
-    trajectory_.push(e.t, e.x.pose(), e.x.v);
-    ++next;
-  }
-}
-
-void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
-  s.accel *= accel_scale_;
-  ++statistics_.sensors[static_cast<std::size_t>(Sensor::imu)].used;
-  imu_.push_back(s);
-  if (s.t < estimate_->t) return;
-  while (!pending_.empty() && pending_.front().end <= s.t) {
-    const PendingScan next = std::move(pending_.front());
-    pending_.pop_front();
-    process(next.scan, next.end, out);
-  }
-  propagate(*estimate_, s.t);
-  keep_finite();
-  // Without sweeps nothing older than this will be replayed.
-  constexpr Duration longest_replay = std::chrono::seconds(2);
-  if (s.t - anchor_.t > longest_replay && pending_.empty()) settle(*estimate_);
-  out.push_back(output_now());
-}
-
-void Estimator::settle(const Estimate& e) {
-  anchor_ = e;
-  while (imu_.size() > 2 && imu_[1].t <= anchor_.t) imu_.pop_front();
-}
-
 bool Estimator::keep_finite() {
   if (is_finite(*estimate_)) return true;
   // Back to the last good state; where the robot went since, nobody knows.
@@ -222,74 +149,26 @@ bool Estimator::keep_finite() {
   anchor_.x.v.setZero();
   anchor_.P.diagonal().segment<3>(at::v).array() += 1.0;
   anchor_.P.diagonal().segment<6>(at::R).array() += 0.01;
-  estimate_ = anchor_;
+  for (std::size_t side = 0; side < 2; ++side) end_stance(anchor_, side);
+  estimate_ = closed_ = anchor_;
+  replay_.clear_steps();
+  stances_.restart();
   ++statistics_.rollbacks;
   trajectory_.clear();
   trajectory_.push(t, estimate_->x.pose(), estimate_->x.v);
   return false;
 }
 
-Output Estimator::output_now() const {
-  Output o;
+Output Estimator::output_now() {
+  Output o = sweep_ ? std::move(*sweep_) : Output{};
+  sweep_.reset();
   o.t = estimate_->t;
   o.x = estimate_->x;
   o.P = estimate_->P;
   o.P.topLeftCorner<6, 6>() += map_error_.at(estimate_->x.pose());
-  o.modality = used_[static_cast<std::size_t>(Sensor::lidar)] ? Modality::li : Modality::coast;
+  o.modality = modality_;
+  o.cause = cause_;
   return o;
-}
-
-void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& out) {
-  if (end < anchor_.t) return drop(Sensor::lidar, "before the state");
-  Stopwatch watch;
-  // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
-  // the sweep cancels to first order. What came since is replayed.
-  const Time centre = std::max(anchor_.t, end - (end - begin_of(scan)) / 2);
-  Estimate prior = anchor_;
-  propagate(prior, centre);
-  Estimate ahead = prior;
-  propagate(ahead, end);
-  const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
-  const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size, config_.lidar.reach());
-  const Eigen::Vector3d p_IL = robot_.lidar.T_imu_lidar.p;
-  LidarConfig lidar = config_.lidar;
-  // With hysteresis: each change of mind would hand what was drifted since to the map.
-  constexpr double to_leave = 3.0;
-  if (degenerate_) lidar.weak_share *= to_leave;
-  LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar, workers_);
-  const PoseCovariance within_scan = undistortion_noise(config_.noise, end - centre);
-  const auto measured = [&](const State& x, const Covariance& P) {
-    Information<6> info = model(x, P);
-    add_common_noise(within_scan, info);
-    return info;
-  };
-  estimate_ = map_.empty() ? prior : update(prior, measured, config_.update).posterior;
-  const bool good = keep_finite();
-  StageTimes stages;
-  stages.lidar_us = watch.lap_us();
-
-  const SE3 T_WI = estimate_->x.pose();
-  if (good) {
-    trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
-    map_error_.registered(T_WI, model.by_epoch(), weak_part(model.report().degeneracy));
-    const std::uint32_t epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
-    map_.insert(to_world(clusters, T_WI, p_IL, config_.lidar), epoch);
-    map_.forget(estimate_->x.p);
-    degenerate_ = model.report().degeneracy.weak_count > 0;
-    settle(*estimate_);
-  }
-  stages.map_us = watch.lap_us();
-
-  propagate(*estimate_, end);
-  ++statistics_.sensors[static_cast<std::size_t>(Sensor::lidar)].used;
-  statistics_.diverged = statistics_.diverged || estimate_->x.v.norm() > absurd_speed;
-  Output o = output_now();
-  o.is_sweep = true;
-  o.registration = model.report();
-  o.points_W = in_world(points, T_WI);
-  o.stages = stages;
-  o.stages.other_us = watch.lap_us();
-  out.push_back(std::move(o));
 }
 
 }  // namespace kilvo

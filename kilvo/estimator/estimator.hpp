@@ -11,6 +11,7 @@
 #include "kilvo/estimator/initialise.hpp"
 #include "kilvo/estimator/map_error.hpp"
 #include "kilvo/estimator/output.hpp"
+#include "kilvo/estimator/replay.hpp"
 #include "kilvo/estimator/timeline.hpp"
 #include "kilvo/filter/trajectory.hpp"
 #include "kilvo/map/voxel_map.hpp"
@@ -37,18 +38,26 @@ class Estimator {
   std::string waiting_for() const { return initialised() ? std::string() : initialiser_.waiting_for(); }
 
  private:
+  // estimator.cpp: the order of things
   void handle(Measurement& m, std::vector<Output>& out);
-  void handle_imu(ImuSample s, std::vector<Output>& out);
   void handle_before_start(Measurement& m, std::vector<Output>& out);
   void begin(const Start& start, std::vector<Output>& out);
-  ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
-  void propagate(Estimate& e, Time until);
-  void process(const LidarScan& scan, Time end, std::vector<Output>& out);
   void bound_pending();
-  void settle(const Estimate& e);  // nothing before it will be replayed
-  bool keep_finite();
   void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
-  Output output_now() const;
+  bool uses(Sensor s) const { return used_[static_cast<std::size_t>(s)]; }
+  bool keep_finite();
+  Output output_now();  // with what a sweep left to go out
+
+  // asynchronous.cpp: IMU and legs
+  void handle_imu(ImuSample s, std::vector<Output>& out);
+  void handle_legs(const JointSample& s, std::vector<Output>& out);
+  void lose_legs(Time t);
+  void choose_modality(Time t);
+
+  // sequential.cpp: sweeps
+  void process_pending(Time until, std::vector<Output>& out);
+  void process(const LidarScan& scan, Time end, std::vector<Output>& out);
+  void settle(const Estimate& e);  // nothing before it will be replayed
 
   Robot robot_;
   EstimatorConfig config_;
@@ -58,19 +67,29 @@ class Estimator {
   std::deque<Measurement> before_start_;
   double accel_scale_ = 1;
 
-  std::optional<Estimate> estimate_;  // at the newest IMU sample
+  std::optional<Estimate> estimate_;  // now: at the newest IMU or leg sample
+  Estimate closed_;                   // at the newest IMU sample, all intervals before it with both their ends
   Estimate anchor_;                   // after the last sweep, at the sweep's own time; what came since is replayed on it
-  std::deque<ImuSample> imu_;         // from the last one before the anchor on
+  Replay replay_;                     // from the anchor on
   struct PendingScan {
     LidarScan scan;
     Time end;
   };
   std::deque<PendingScan> pending_;
+  std::optional<Output> sweep_;  // a sweep's results, to go out with the next leg sample
   Trajectory trajectory_;
   VoxelMap map_;
   Workers workers_;
   MapError map_error_;
   bool degenerate_ = false;  // the last sweep had a weak direction
+
+  std::optional<LegKinematics> kinematics_;
+  ContactEstimator contacts_;
+  StanceTracker stances_;
+  std::optional<Time> last_legs_;  // while the legs are used
+  Time last_sweep_{};              // end of the last sweep, or the start
+  Modality modality_ = Modality::coast;
+  const char* cause_ = "start";
   Statistics statistics_;
 };
 

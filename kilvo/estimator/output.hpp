@@ -1,14 +1,16 @@
-// What the world gets: one for each IMU sample and each sweep.
+// What the world gets: one for each leg sample while the legs are used, otherwise one for each IMU sample and each sweep.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "kilvo/estimator/modality.hpp"
 #include "kilvo/filter/state.hpp"
+#include "kilvo/legs/contact_estimator.hpp"
 #include "kilvo/lidar/point_to_plane.hpp"
 #include "kilvo/sensors/measurement.hpp"
 
@@ -26,7 +28,11 @@ struct Output {
   State x;
   Covariance P = Covariance::Zero();  // of the error relative to the first pose (state.hpp: at)
   Modality modality = Modality::coast;
+  const char* cause = "start";  // of the last change of modality
   bool is_sweep = false;  // state after the last update of a sweep
+  std::optional<Contacts> contacts;  // of each leg sample
+  double kinematic_us = 0;           // of a leg sample: kinematics, contacts, prediction and update
+  double contact_us = 0;             // the contacts' part of it
   // Only of sweeps:
   std::vector<PointXYZI> points_W;  // undistorted, in the world
   RegistrationReport registration;

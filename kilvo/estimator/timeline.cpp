@@ -56,7 +56,7 @@ std::optional<std::string> Timeline::admit(Measurement m, Time key) {
     stamp_[s] = stamp;
   }
   newest_of_all_ = std::max(newest_of_all_.value_or(key), key);
-  waiting_.emplace(std::pair(key, sequence_++), std::move(m));
+  waiting_.emplace(std::tuple(key, sensor_of(m), sequence_++), std::move(m));
   return std::nullopt;
 }
 
@@ -69,9 +69,9 @@ bool Timeline::may_go(Time key) const {
 }
 
 std::optional<Measurement> Timeline::pop() {
-  if (waiting_.empty() || !may_go(waiting_.begin()->first.first)) return std::nullopt;
+  if (waiting_.empty() || !may_go(std::get<Time>(waiting_.begin()->first))) return std::nullopt;
   auto first = waiting_.extract(waiting_.begin());
-  released_ = first.key().first;
+  released_ = std::get<Time>(first.key());
   return std::move(first.mapped());
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -46,7 +47,8 @@ class Timeline {
   std::array<std::optional<Time>, sensor_count> newest_;
   std::array<std::optional<Time>, sensor_count> stamp_;  // of the newest
   std::optional<Time> released_, newest_of_all_;
-  std::map<std::pair<Time, std::uint64_t>, Measurement> waiting_;  // by completion, then by arrival
+  // By completion; of the same time the IMU first; then by arrival.
+  std::map<std::tuple<Time, Sensor, std::uint64_t>, Measurement> waiting_;
   std::vector<Measurement> suspects_;                              // ahead of all others
   std::vector<Sensor> jumped_;
   std::uint64_t sequence_ = 0;

@@ -1,0 +1,98 @@
+#include "kilvo/estimator/replay.hpp"
+
+#include <algorithm>
+
+#include "kilvo/filter/update.hpp"
+
+namespace kilvo {
+
+// The closed interval [begin, end] between two samples; when nobody saw the motion in between, with noise that says so.
+ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const {
+  ImuInterval interval = ImuInterval::between(a, b, begin, end);
+  const double gap = to_seconds(b.t - a.t);
+  if (gap <= config_.max_imu_gap) return interval;
+  constexpr double unknown_accel = 3.0;  // m/s^2, constant over the gap: as a density, times the gap
+  interval.noise_scale = unknown_accel * unknown_accel * gap / (config_.noise.accel * config_.noise.accel);
+  constexpr double blind = 1.0;  // s; after longer than this the two samples say nothing of the time between
+  if (gap > blind) {
+    interval.gyro_begin = interval.gyro_end = x.bg;
+    interval.accel_begin = interval.accel_end = x.ba - x.R.inverse() * x.g;
+  }
+  return interval;
+}
+
+FootOrientations Replay::standing_at(Time t) const {
+  FootOrientations out;
+  const auto after = std::upper_bound(steps_.begin(), steps_.end(), t, [](Time value, const LegStep& s) { return value < s.t; });
+  if (after == steps_.begin()) return out;
+  for (std::size_t side = 0; side < 2; ++side) {
+    const Stance& foot = (after - 1)->foot[side];
+    if (foot.used) out[side] = foot.R_IF;
+  }
+  return out;
+}
+
+void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
+  if (imu_.empty()) return;
+  const FootOrientations feet = standing_at(e.t);
+  const auto step = [&](const ImuInterval& interval) {
+    e = predict(e, interval, feet, config_.noise);
+    if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
+  };
+  // The first sample after e.t.
+  auto next = std::upper_bound(imu_.begin(), imu_.end(), e.t, [](Time t, const ImuSample& s) { return t < s.t; });
+  for (; e.t < until && next != imu_.end(); ++next) {
+    const ImuSample& a = next == imu_.begin() ? *next : *(next - 1);
+    step(interval_between(a, *next, e.t, std::min(until, next->t), e.x));
+  }
+  if (e.t >= until) return;
+  ImuSample held = imu_.back();
+  held.t = until;
+  ImuInterval interval = interval_between(imu_.back(), held, e.t, until, e.x);
+  interval.begin = e.t;
+  interval.end = until;
+  step(interval);
+}
+
+Eigen::Vector3d Replay::gyro_at(Time t) const {
+  const auto next = std::lower_bound(imu_.begin(), imu_.end(), t, [](const ImuSample& s, Time value) { return s.t < value; });
+  if (next == imu_.end()) return imu_.back().gyro;
+  if (next == imu_.begin() || next->t == t) return next->gyro;
+  const ImuSample& a = *(next - 1);
+  return a.gyro + (to_seconds(t - a.t) / to_seconds(next->t - a.t)) * (next->gyro - a.gyro);
+}
+
+int Replay::apply(Estimate& e, const LegStep& step) const {
+  bool any = false;
+  for (std::size_t side = 0; side < 2; ++side) {
+    const Stance& foot = step.foot[side];
+    if (foot.ends) end_stance(e, side);
+    if (foot.begins) begin_stance(e, side, foot.point, config_.legs);
+    if (foot.used && !foot.begins) e.x.pc[side] += e.x.R * foot.shift;
+    any = any || foot.used;
+  }
+  if (!any || imu_.empty()) return 0;
+  LegModel model(step, gyro_at(step.t), config_.legs);
+  // The rows are nearly linear: one iteration.
+  UpdateConfig once;
+  once.max_iterations = 1;
+  e = update(e, model, once).posterior;
+  return static_cast<int>(model.passed()[0]) + static_cast<int>(model.passed()[1]);
+}
+
+void Replay::advance(Estimate& e, Time until, Trajectory& record) const {
+  auto step = std::upper_bound(steps_.begin(), steps_.end(), e.t, [](Time t, const LegStep& s) { return t < s.t; });
+  for (; step != steps_.end() && step->t <= until; ++step) {
+    predict_to(e, step->t, &record);
+    apply(e, *step);
+    record.push(e.t, e.x.pose(), e.x.v);
+  }
+  predict_to(e, until, &record);
+}
+
+void Replay::forget_before(Time t) {
+  while (imu_.size() > 2 && imu_[1].t <= t) imu_.pop_front();
+  while (steps_.size() > 1 && steps_[1].t <= t) steps_.pop_front();
+}
+
+}  // namespace kilvo

@@ -1,0 +1,48 @@
+// What IMU and legs said since a time, and how an estimate of that time is brought to a later one: the same road whether it is taken once
+// or again after a sweep has corrected its beginning.
+#pragma once
+
+#include <deque>
+
+#include "kilvo/estimator/config.hpp"
+#include "kilvo/filter/trajectory.hpp"
+#include "kilvo/legs/leg_measurements.hpp"
+
+namespace kilvo {
+
+class Replay {
+ public:
+  explicit Replay(const EstimatorConfig& config) : config_(config) {}
+
+  /// In time order, each kind by itself.
+  void add(const ImuSample& s) { imu_.push_back(s); }
+  void add(const LegStep& s) { steps_.push_back(s); }
+
+  bool has_imu() const { return !imu_.empty(); }
+  const ImuSample& newest_imu() const { return imu_.back(); }
+
+  /// Predicts e to `until`, applying the leg steps after e.t on the way. Between IMU samples with both of them, after the newest one with
+  /// that held. Every state goes into `record`.
+  void advance(Estimate& e, Time until, Trajectory& record) const;
+
+  /// Predicts e to `until` without looking at the legs.
+  void predict_to(Estimate& e, Time until, Trajectory* record) const;
+
+  /// Applies one leg step to e, which must be of its time. Returns how many feet of it were used.
+  int apply(Estimate& e, const LegStep& step) const;
+
+  /// What is not needed by estimates of `t` and later.
+  void forget_before(Time t);
+  void clear_steps() { steps_.clear(); }
+
+ private:
+  ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
+  Eigen::Vector3d gyro_at(Time t) const;
+  FootOrientations standing_at(Time t) const;
+
+  EstimatorConfig config_;
+  std::deque<ImuSample> imu_;
+  std::deque<LegStep> steps_;
+};
+
+}  // namespace kilvo

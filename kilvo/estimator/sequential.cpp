@@ -1,0 +1,98 @@
+// The sequential phase: a sweep updates the state at its middle; what came since is replayed.
+#include <algorithm>
+
+#include "kilvo/estimator/estimator.hpp"
+#include "kilvo/estimator/stopwatch.hpp"
+#include "kilvo/lidar/downsample.hpp"
+#include "kilvo/lidar/undistort.hpp"
+
+namespace kilvo {
+namespace {
+
+// A walking machine that is faster than this has lost itself.
+constexpr double absurd_speed = 30;  // m/s
+
+std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE3& T_WI) {
+  std::vector<PointXYZI> out(points_I.size());
+  const Eigen::Matrix3f R = T_WI.R.matrix().cast<float>();
+  const Eigen::Vector3f p = T_WI.p.cast<float>();
+  for (std::size_t i = 0; i < points_I.size(); ++i) {
+    out[i].head<3>() = R * points_I[i].head<3>() + p;
+    out[i][3] = points_I[i][3];
+  }
+  return out;
+}
+
+}  // namespace
+
+void Estimator::settle(const Estimate& e) {
+  anchor_ = e;
+  replay_.forget_before(anchor_.t);
+}
+
+void Estimator::process_pending(Time until, std::vector<Output>& out) {
+  while (!pending_.empty() && pending_.front().end <= until) {
+    const PendingScan next = std::move(pending_.front());
+    pending_.pop_front();
+    process(next.scan, next.end, out);
+  }
+}
+
+void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& out) {
+  if (end < anchor_.t) return drop(Sensor::lidar, "before the state");
+  Stopwatch watch;
+  // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
+  // the sweep cancels to first order. What came since is replayed.
+  const Time centre = std::max(anchor_.t, end - (end - begin_of(scan)) / 2);
+  Estimate prior = anchor_;
+  replay_.advance(prior, centre, trajectory_);
+  Estimate ahead = prior;
+  replay_.advance(ahead, end, trajectory_);
+  const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
+  const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size, config_.lidar.reach());
+  const Eigen::Vector3d p_IL = robot_.lidar.T_imu_lidar.p;
+  LidarConfig lidar = config_.lidar;
+  // With hysteresis: each change of mind would hand what was drifted since to the map.
+  constexpr double to_leave = 3.0;
+  if (degenerate_) lidar.weak_share *= to_leave;
+  LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar, workers_);
+  const PoseCovariance within_scan = undistortion_noise(config_.noise, end - centre);
+  const auto measured = [&](const State& x, const Covariance& P) {
+    Information<6> info = model(x, P);
+    add_common_noise(within_scan, info);
+    return info;
+  };
+  estimate_ = map_.empty() ? prior : update(prior, measured, config_.update).posterior;
+  const bool good = keep_finite();
+  StageTimes stages;
+  stages.lidar_us = watch.lap_us();
+
+  const SE3 T_WI = estimate_->x.pose();
+  if (good) {
+    trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
+    map_error_.registered(T_WI, model.by_epoch(), weak_part(model.report().degeneracy));
+    const std::uint32_t epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
+    map_.insert(to_world(clusters, T_WI, p_IL, config_.lidar), epoch);
+    map_.forget(estimate_->x.p);
+    degenerate_ = model.report().degeneracy.weak_count > 0;
+    settle(*estimate_);
+  }
+  stages.map_us = watch.lap_us();
+
+  replay_.advance(*estimate_, end, trajectory_);
+  ++statistics_.sensors[static_cast<std::size_t>(Sensor::lidar)].used;
+  statistics_.diverged = statistics_.diverged || estimate_->x.v.norm() > absurd_speed;
+  last_sweep_ = end;
+  choose_modality(end);
+  if (sweep_) out.push_back(output_now());  // two sweeps within one leg sample
+  sweep_.emplace();
+  sweep_->is_sweep = true;
+  sweep_->registration = model.report();
+  sweep_->points_W = in_world(points, T_WI);
+  sweep_->stages = stages;
+  sweep_->stages.other_us = watch.lap_us();
+  // While the legs are used it goes out with the next of their samples, which is not earlier than those that have gone.
+  if (!last_legs_) out.push_back(output_now());
+}
+
+}  // namespace kilvo

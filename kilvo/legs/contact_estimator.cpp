@@ -1,0 +1,146 @@
+#include "kilvo/legs/contact_estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace kilvo {
+namespace {
+
+using std::chrono::milliseconds;
+
+// A person, a G1 and an iCub walk at about this Froude speed, sqrt(g l): the first guess, until a swing has been seen.
+constexpr double froude_share = 0.4;
+// How much a new swing counts.
+constexpr double swing_gain = 0.3;
+// A swing shorter than this, or slower than a third of the usual, teaches nothing.
+constexpr Duration shortest_swing = milliseconds(120);
+constexpr double slowest_swing = 0.3;
+// While it settles, a foot must be faster than this share to be lifted: soft ground bounces.
+constexpr double settling_factor = 7;
+// A cue must last so long. At low rates so many samples.
+constexpr Duration lift_frames = milliseconds(2), impact_frames = milliseconds(1), slow_frames = milliseconds(4);
+// How far back descent and speed before an impact are looked for.
+constexpr Duration impact_window = milliseconds(20), descent_window = milliseconds(80);
+// An impact begins at this share of the swing speed at least; a descent is faster than this.
+constexpr double impact_speed = 0.4, descent_speed = 0.1;
+// An impact has taken this much of the downward speed.
+constexpr double impact_rest = 0.7;
+// Without any descent: still for so long, near the ground.
+constexpr Duration still_frames = milliseconds(200);
+constexpr double detection_threshold = 10;  // theta_d
+constexpr double statistics_time = 2.0;     // s
+
+}  // namespace
+
+FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d& omega) {
+  FootMotion out;
+  out.slowest = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < foot.corners; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const Eigen::Vector3d v_W = x.v + x.R * (omega.cross(foot.p[k]) + foot.v[k]);
+    out.slowest = std::min(out.slowest, v_W.squaredNorm());
+  }
+  out.slowest = std::sqrt(out.slowest);
+  const SolePoint low = lowest_point(foot, x.R.matrix().transpose() * Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d v_W = x.v + x.R * (omega.cross(low.p) + low.v);
+  out.speed = v_W.norm();
+  out.vertical = v_W.z();
+  out.lowest_W = x.pose() * low.p;
+  return out;
+}
+
+void ContactEstimator::start(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion) {
+  const double leg = std::max(std::abs((x.R * feet.foot[0].p[0]).z()), std::abs((x.R * feet.foot[1].p[0]).z()));
+  if (swing_speed_ == 0) swing_speed_ = froude_share * std::sqrt(standard_gravity * std::max(leg, 0.1));
+  for (std::size_t side = 0; side < 2; ++side) {
+    FootState& f = foot_[side];
+    f = {};
+    f.since = feet.t - milliseconds(1000);
+    f.ground_z = motion[side].lowest_W.z();
+    contacts_.on[side] = true;
+  }
+  started_ = true;
+}
+
+// True once the cue has been there in every sample for `at_least`, and for three samples.
+bool ContactEstimator::held(std::optional<Time>& since, bool cue, Time t, Duration at_least) const {
+  if (!cue) {
+    since.reset();
+    return false;
+  }
+  if (!since) since = t;
+  return t - *since >= at_least;
+}
+
+bool ContactEstimator::lifts(FootState& f, const FootMotion& m, Time t) const {
+  const bool settling = to_seconds(t - f.since) < config_.settling;
+  const double speed = config_.lift_off_speed * swing_speed_ * (settling ? settling_factor : 1.0);
+  return held(f.moving, m.slowest > speed, t, std::max(lift_frames, 2 * period_));
+}
+
+bool ContactEstimator::lands(FootState& f, const FootMotion& m, Time t) const {
+  double fastest = 0, down_now = 0, down = 0;
+  for (std::size_t back = 0; back < std::min(f.count, history); ++back) {
+    const Sample& s = f.samples[(f.count - 1 - back) % history];
+    if (t - s.t > descent_window) break;
+    down = std::min(down, s.vertical);
+    if (t - s.t > impact_window) continue;
+    fastest = std::max(fastest, s.speed);
+    down_now = std::min(down_now, s.vertical);
+  }
+  const double S = swing_speed_;
+  const bool impact = m.speed < config_.impact_drop * fastest && fastest > impact_speed * S && down_now < -descent_speed * S &&
+                      m.vertical > impact_rest * down_now;
+  const bool slow = m.slowest < config_.touchdown_speed * S;
+  if (held(f.impact, impact, t, std::min(impact_frames, period_))) return true;
+  const bool slow_long = held(f.slow, slow, t, std::max(slow_frames, 2 * period_));
+  if (slow_long && down < -descent_speed * S) return true;
+  return slow_long && t - *f.slow >= still_frames;
+}
+
+// Deviation of the acceleration from its usual values (while a foot swings, or from the start), in their standard deviations.
+void ContactEstimator::deviate(const Eigen::Vector3d& accel, double dt) {
+  constexpr double least_variance = 1e-4;  // (m/s^2)^2
+  const double share = std::clamp(dt / statistics_time, 0.0, 1.0);
+  if (accel_mean_.isZero(0)) accel_mean_ = accel;
+  const Eigen::Vector3d off = accel - accel_mean_;
+  contacts_.d_a = (off.array().abs() / (accel_variance_.array() + least_variance).sqrt()).sum();
+  accel_mean_ += share * off;
+  accel_variance_ += share * (off.cwiseAbs2() - accel_variance_);
+}
+
+const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel) {
+  const std::array<FootMotion, 2> motion = {motion_of(feet.foot[0], x, omega), motion_of(feet.foot[1], x, omega)};
+  if (!started_) {
+    contacts_.t = feet.t;
+    start(feet, x, motion);
+  }
+  period_ = std::clamp(feet.t - contacts_.t, Duration(0), Duration(milliseconds(20)));
+  deviate(accel, to_seconds(period_));
+  contacts_.t = feet.t;
+  for (std::size_t side = 0; side < 2; ++side) {
+    FootState& f = foot_[side];
+    const FootMotion& m = motion[side];
+    f.samples[f.count++ % history] = {feet.t, m.speed, m.vertical};
+    f.peak = std::max(f.peak, m.speed);
+    if (contacts_.on[side] && lifts(f, m, feet.t)) {
+      contacts_.on[side] = false;
+      f.since = feet.t;
+      f.peak = m.speed;
+      f.moving.reset();
+    } else if (!contacts_.on[side] && lands(f, m, feet.t)) {
+      if (f.peak > slowest_swing * swing_speed_ && feet.t - f.since > shortest_swing) swing_speed_ += swing_gain * (f.peak - swing_speed_);
+      contacts_.on[side] = true;
+      f.since = feet.t;
+      f.impact.reset();
+      f.slow.reset();
+    }
+    if (contacts_.on[side]) f.ground_z = m.lowest_W.z();
+    contacts_.clearance[side] = m.lowest_W.z() - f.ground_z;
+    contacts_.d_fv[side] = detection_threshold * m.slowest / (config_.lift_off_speed * swing_speed_);
+  }
+  return contacts_;
+}
+
+}  // namespace kilvo

@@ -1,0 +1,78 @@
+// Which foot stands on the ground, without force sensors: from what its corners do in the world (paper, Section V; docs/decisions say where
+// this departs from it).
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+#include "kilvo/filter/state.hpp"
+#include "kilvo/legs/leg_config.hpp"
+#include "kilvo/legs/leg_kinematics.hpp"
+
+namespace kilvo {
+
+/// What is reported of both feet (left, right).
+struct Contacts {
+  Time t{};
+  std::array<bool, 2> on = {true, true};
+  std::array<double, 2> clearance = {0, 0};  // of the lowest corner over the ground patch, m
+  double d_a = 0;                            // normalised deviation of the acceleration
+  std::array<double, 2> d_fv = {0, 0};       // normalised deviation of the foot's velocity; above 10: it moves
+};
+
+/// A sole's slowest corner and its lowest point, in the world.
+struct FootMotion {
+  double slowest = 0;                                    // speed of the slowest corner, m/s
+  double speed = 0;                                      // of the lowest point, m/s
+  double vertical = 0;                                   // its upward velocity, m/s
+  Eigen::Vector3d lowest_W = Eigen::Vector3d::Zero();    // the lowest point, m
+};
+FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d& omega);
+
+class ContactEstimator {
+ public:
+  explicit ContactEstimator(const LegConfig& config) : config_(config) {}
+
+  /// `x`: the state at feet.t. `omega`, `accel`: bias-free rate (rad/s) and specific force (m/s^2) of the IMU.
+  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel);
+
+  const Contacts& contacts() const { return contacts_; }
+  /// The largest speed of a foot in its last swings, m/s; what all speeds are compared with.
+  double swing_speed() const { return swing_speed_; }
+  /// How long a foot has been on or off, s.
+  double phase(std::size_t side, Time t) const { return to_seconds(t - foot_[side].since); }
+
+  /// Forgets the feet, not the robot: after a gap in the legs' messages. Both are taken as standing until they move.
+  void restart() { started_ = false; }
+
+ private:
+  struct Sample {
+    Time t{};
+    double speed = 0, vertical = 0;
+  };
+  static constexpr std::size_t history = 128;
+  struct FootState {
+    std::array<Sample, history> samples{};
+    std::size_t count = 0;
+    Time since{};                // of the present phase
+    double peak = 0;             // speed in this swing
+    std::optional<Time> moving, impact, slow;  // since when the cue has been there
+    double ground_z = 0;         // height of the last place it stood on
+  };
+  void start(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion);
+  bool lifts(FootState& f, const FootMotion& m, Time t) const;
+  bool lands(FootState& f, const FootMotion& m, Time t) const;
+  bool held(std::optional<Time>& since, bool cue, Time t, Duration at_least) const;
+  void deviate(const Eigen::Vector3d& accel, double dt);
+
+  LegConfig config_;
+  Contacts contacts_;
+  bool started_ = false;
+  double swing_speed_ = 0;
+  Duration period_{};
+  std::array<FootState, 2> foot_;
+  Eigen::Vector3d accel_mean_ = Eigen::Vector3d::Zero(), accel_variance_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace kilvo

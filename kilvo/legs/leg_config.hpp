@@ -1,0 +1,40 @@
+// Settings of the legs. No length, weight or speed of a particular robot is in them: speeds are compared with the robot's own steps.
+#pragma once
+
+#include <tuple>
+
+#include "kilvo/math/field.hpp"
+
+namespace kilvo {
+
+struct LegConfig {
+  double lift_off_speed = 0.1;       // share of the robot's swing speed
+  double touchdown_speed = 0.06;     // share of the robot's swing speed
+  double impact_drop = 0.62;         // share of the speed before
+  double settling = 0.1;             // s
+  double velocity_sigma = 0.01;      // m/s
+  double velocity_correlation = 0.005;  // s
+  double position_sigma = 0.001;     // m
+  double position_correlation = 0.02;  // s
+  double entry_delay = 0.015;        // s
+  double gate = 5.0;
+
+  static constexpr auto fields() {
+    return std::tuple{
+        Field{"lift_off_speed", &LegConfig::lift_off_speed, "-",
+              "a foot none of whose corners is slower than this share of the robot's own swing speed has left the ground"},
+        Field{"touchdown_speed", &LegConfig::touchdown_speed, "-",
+              "a descending foot with a corner slower than this share of the swing speed has reached the ground"},
+        Field{"impact_drop", &LegConfig::impact_drop, "-",
+              "a descending foot whose speed falls below this share of what it was 20 ms before has reached the ground"},
+        Field{"settling", &LegConfig::settling, "s", "after touchdown a foot needs seven times the speed to be called lifted, for so long"},
+        Field{"velocity_sigma", &LegConfig::velocity_sigma, "m/s", "standard deviation of the velocity of a standing foot"},
+        Field{"velocity_correlation", &LegConfig::velocity_correlation, "s", "correlation time of that: rows closer together share it"},
+        Field{"position_sigma", &LegConfig::position_sigma, "m", "standard deviation of the position of a standing foot"},
+        Field{"position_correlation", &LegConfig::position_correlation, "s", "correlation time of that"},
+        Field{"entry_delay", &LegConfig::entry_delay, "s", "a foot is used this long after its touchdown"},
+        Field{"gate", &LegConfig::gate, "sigma", "a standing foot that moves more than this is not used"}};
+  }
+};
+
+}  // namespace kilvo

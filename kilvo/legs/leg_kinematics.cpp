@@ -1,0 +1,224 @@
+#include "kilvo/legs/leg_kinematics.hpp"
+
+#include <urdf_parser/urdf_parser.h>
+
+#include <algorithm>
+#include <cmath>
+#include <kdl/chainfksolvervel_recursive.hpp>
+#include <kdl/tree.hpp>
+#include <optional>
+#include <stdexcept>
+
+namespace kilvo {
+namespace {
+
+// Corners this much higher than the lowest weigh e times less, m.
+constexpr double softness = 0.001;
+
+KDL::Vector to_kdl(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
+KDL::Frame to_kdl(const urdf::Pose& p) {
+  return {KDL::Rotation::Quaternion(p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w), to_kdl(p.position)};
+}
+Eigen::Vector3d to_eigen(const KDL::Vector& v) { return {v.x(), v.y(), v.z()}; }
+Eigen::Matrix3d to_eigen(const KDL::Rotation& R) {
+  Eigen::Matrix3d M;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) M(i, j) = R(i, j);
+  }
+  return M;
+}
+
+KDL::Joint to_kdl(const urdf::Joint& joint, bool locked) {
+  const KDL::Frame origin = to_kdl(joint.parent_to_joint_origin_transform);
+  const KDL::Vector axis = origin.M * to_kdl(joint.axis);
+  if (!locked && (joint.type == urdf::Joint::REVOLUTE || joint.type == urdf::Joint::CONTINUOUS))
+    return {joint.name, origin.p, axis, KDL::Joint::RotAxis};
+  if (!locked && joint.type == urdf::Joint::PRISMATIC) return {joint.name, origin.p, axis, KDL::Joint::TransAxis};
+  if (!locked && joint.type != urdf::Joint::FIXED)
+    throw std::invalid_argument("robot.urdf: joint " + joint.name + " is neither revolute, prismatic nor fixed");
+  return KDL::Joint(joint.name, KDL::Joint::Fixed);
+}
+
+void add_children(const urdf::Link& link, const Robot& robot, KDL::Tree& tree) {
+  for (const auto& child : link.child_links) {
+    const urdf::Joint& joint = *child->parent_joint;
+    const bool locked = std::ranges::find(robot.locked_joints, joint.name) != robot.locked_joints.end();
+    const KDL::Segment segment(child->name, to_kdl(joint, locked), to_kdl(joint.parent_to_joint_origin_transform));
+    if (!tree.addSegment(segment, link.name)) throw std::invalid_argument("robot.urdf: link " + child->name + " cannot be attached");
+    add_children(*child, robot, tree);
+  }
+}
+
+KDL::Tree tree_of(const Robot& robot) {
+  const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(robot.urdf);
+  if (!model || !model->getRoot()) throw std::invalid_argument("robot.urdf is not a URDF document");
+  KDL::Tree tree(model->getRoot()->name);
+  add_children(*model->getRoot(), robot, tree);
+  return tree;
+}
+
+// One leg: the solver with its input, and where in the message each joint is.
+struct Leg {
+  KDL::Chain chain;
+  std::unique_ptr<KDL::ChainFkSolverVel_recursive> solver;  // refers to the chain: made when the leg is where it stays
+  KDL::JntArrayVel joints;
+  std::vector<std::string> names;   // of the moving joints, from the IMU to the foot
+  std::vector<std::size_t> places;  // in the message, by joint
+};
+
+Leg leg_of(const KDL::Tree& tree, const std::string& imu_link, const Foot& foot) {
+  Leg leg;
+  for (const std::string& link : {imu_link, foot.link}) {
+    if (tree.getSegment(link) == tree.getSegments().end()) throw std::invalid_argument("robot.urdf has no link " + link);
+  }
+  if (!tree.getChain(imu_link, foot.link, leg.chain))
+    throw std::invalid_argument("robot.urdf: no way from link " + imu_link + " to link " + foot.link);
+  for (const KDL::Segment& s : leg.chain.segments) {
+    if (s.getJoint().getType() != KDL::Joint::Fixed) leg.names.push_back(s.getJoint().getName());
+  }
+  leg.joints.resize(leg.chain.getNrOfJoints());
+  return leg;
+}
+
+}  // namespace
+
+struct LegKinematics::Chains {
+  bool by_joints = true;
+  std::array<Foot, 2> feet;
+  SE3 T_IL;  // the IMU's link in the IMU frame
+  LegsMount mount;
+  std::array<Leg, 2> legs;
+  std::vector<std::string> message_names;  // that the places are for
+  // For messages without velocities.
+  std::vector<double> last_position, velocity;
+  Time last_t{};
+
+  std::optional<std::string> find_places(const std::vector<std::string>& names);
+  const std::vector<double>& velocity_of(const JointSample& s);
+  FootPose pose_of(std::size_t side, const JointSample& s, const std::vector<double>& velocity);
+};
+
+// Where in a message of these names each joint is.
+std::optional<std::string> LegKinematics::Chains::find_places(const std::vector<std::string>& names) {
+  if (names == message_names) return std::nullopt;
+  for (Leg& leg : legs) {
+    leg.places.clear();
+    for (const std::string& joint : leg.names) {
+      const auto it = std::ranges::find(names, joint);
+      if (it == names.end()) {
+        message_names.clear();
+        return "joint " + joint + " is neither in the message nor in robot.locked_joints";
+      }
+      leg.places.push_back(static_cast<std::size_t>(it - names.begin()));
+    }
+  }
+  message_names = names;
+  return std::nullopt;
+}
+
+const std::vector<double>& LegKinematics::Chains::velocity_of(const JointSample& s) {
+  if (s.velocity.size() == s.position.size()) return s.velocity;
+  const double dt = to_seconds(s.t - last_t);
+  constexpr double longest = 0.1;  // s
+  constexpr double smoothing = 0.001;  // s, of the low pass over the differences
+  velocity.resize(s.position.size(), 0.0);
+  if (last_position.size() == s.position.size() && dt > 0 && dt < longest) {
+    const double share = dt / (dt + smoothing);
+    for (std::size_t i = 0; i < velocity.size(); ++i) velocity[i] += share * ((s.position[i] - last_position[i]) / dt - velocity[i]);
+  } else {
+    std::ranges::fill(velocity, 0.0);
+  }
+  last_position = s.position;
+  last_t = s.t;
+  return velocity;
+}
+
+FootPose LegKinematics::Chains::pose_of(std::size_t side, const JointSample& s, const std::vector<double>& velocity_of_all) {
+  FootPose out;
+  if (!by_joints) {
+    const auto triple = [side](const std::vector<double>& all) { return Eigen::Vector3d(all[3 * side], all[3 * side + 1], all[3 * side + 2]); };
+    out.corners = 1;
+    const Eigen::Vector3d down(0, 0, -mount.sole_offset);
+    out.p[0] = mount.T_imu_feet * (triple(s.position) + down);
+    out.v[0] = mount.T_imu_feet.R * triple(velocity_of_all);
+    return out;
+  }
+  Leg& leg = legs[side];
+  for (std::size_t i = 0; i < leg.places.size(); ++i) {
+    leg.joints.q(static_cast<unsigned>(i)) = s.position[leg.places[i]];
+    leg.joints.qdot(static_cast<unsigned>(i)) = velocity_of_all[leg.places[i]];
+  }
+  KDL::FrameVel frame;
+  leg.solver->JntToCart(leg.joints, frame);
+  const SE3 T_LF{SO3::nearest(to_eigen(frame.M.R)), to_eigen(frame.p.p)};
+  const Eigen::Vector3d omega = to_eigen(frame.M.w), v = to_eigen(frame.p.v);
+  out.R_IF = T_IL.R * T_LF.R;
+  out.corners = static_cast<int>(feet[side].sole.size());
+  for (std::size_t i = 0; i < feet[side].sole.size(); ++i) {
+    const Eigen::Vector3d arm = T_LF.R * feet[side].sole[i];
+    out.p[i] = T_IL * (T_LF.p + arm);
+    out.v[i] = T_IL.R * (v + omega.cross(arm));
+  }
+  return out;
+}
+
+LegKinematics::LegKinematics(const Robot& robot) : chains_(std::make_unique<Chains>()) {
+  Chains& c = *chains_;
+  c.mount = robot.legs;
+  c.by_joints = robot.legs.type != "feet";
+  c.feet = robot.feet;
+  c.T_IL = robot.imu.T_link_imu.inverse();
+  if (!c.by_joints) return;
+  if (robot.urdf.empty()) throw std::invalid_argument("robot.urdf is needed to use the legs");
+  const KDL::Tree tree = tree_of(robot);
+  for (std::size_t side = 0; side < 2; ++side) {
+    const Foot& foot = robot.feet[side];
+    if (foot.sole.empty() || foot.sole.size() > max_corners)
+      throw std::invalid_argument("robot.feet: the sole of " + foot.name + " needs 1 to " + std::to_string(max_corners) + " points");
+    c.legs[side] = leg_of(tree, robot.imu.link, foot);
+    c.legs[side].solver = std::make_unique<KDL::ChainFkSolverVel_recursive>(c.legs[side].chain);
+  }
+}
+
+LegKinematics::LegKinematics(LegKinematics&&) noexcept = default;
+LegKinematics::~LegKinematics() = default;
+
+std::variant<Feet, std::string> LegKinematics::feet(const JointSample& s) {
+  Chains& c = *chains_;
+  if (c.by_joints) {
+    if (s.names.size() != s.position.size()) return "as many names as positions are needed";
+    if (auto missing = c.find_places(s.names)) return std::move(*missing);
+  } else if (s.position.size() < 6) {
+    return "two feet need six positions";
+  }
+  const std::vector<double>& velocity = c.velocity_of(s);
+  Feet out;
+  out.t = s.t;
+  for (std::size_t side = 0; side < 2; ++side) {
+    out.foot[side] = c.pose_of(side, s, velocity);
+    for (int i = 0; i < out.foot[side].corners; ++i) {
+      if (!out.foot[side].p[static_cast<std::size_t>(i)].allFinite() || !out.foot[side].v[static_cast<std::size_t>(i)].allFinite())
+        return "not finite";
+    }
+  }
+  return out;
+}
+
+SolePoint lowest_point(const FootPose& foot, const Eigen::Vector3d& up_I) {
+  double lowest = up_I.dot(foot.p[0]);
+  for (int i = 1; i < foot.corners; ++i) lowest = std::min(lowest, up_I.dot(foot.p[static_cast<std::size_t>(i)]));
+  SolePoint out;
+  double sum = 0;
+  for (int i = 0; i < foot.corners; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const double w = std::exp((lowest - up_I.dot(foot.p[k])) / softness);
+    sum += w;
+    out.p += w * foot.p[k];
+    out.v += w * foot.v[k];
+  }
+  out.p /= sum;
+  out.v /= sum;
+  return out;
+}
+
+}  // namespace kilvo

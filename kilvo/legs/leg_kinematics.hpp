@@ -1,0 +1,58 @@
+// Forward kinematics of both legs: from joint encoders to the sole's corner points as the IMU sees them.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <string>
+#include <variant>
+
+#include "kilvo/math/so3.hpp"
+#include "kilvo/sensors/measurement.hpp"
+#include "kilvo/sensors/robot.hpp"
+
+namespace kilvo {
+
+/// Corner points of one sole at most.
+inline constexpr int max_corners = 8;
+
+/// One foot relative to the IMU, in the IMU frame.
+struct FootPose {
+  SO3 R_IF;                                       // h_R(alpha) of Eq. 2
+  int corners = 0;                                // points of the sole in use
+  std::array<Eigen::Vector3d, max_corners> p{};   // the sole's corner points, m
+  std::array<Eigen::Vector3d, max_corners> v{};   // their velocities relative to the IMU, m/s
+};
+
+struct Feet {
+  Time t{};
+  std::array<FootPose, 2> foot;  // left, right
+};
+
+/// A point of a sole: a weighted mean of its corners.
+struct SolePoint {
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();  // IMU frame, m
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();  // relative to the IMU, m/s
+};
+
+/// The point on which a sole stands: corners within about a millimetre of the lowest along `up_I` (unit vector, IMU frame) share it.
+SolePoint lowest_point(const FootPose& foot, const Eigen::Vector3d& up_I);
+
+/// How the joints of a robot move its feet. Through all joints between the IMU's link and each foot's link, the waist included.
+class LegKinematics {
+ public:
+  /// Throws std::invalid_argument naming the link or joint when the URDF cannot be used.
+  explicit LegKinematics(const Robot& robot);
+  LegKinematics(LegKinematics&&) noexcept;
+  ~LegKinematics();
+
+  /// The feet, or why they cannot be known: "not finite", "joint NAME is missing", ... Joints are matched by name, in any order; a message
+  /// without velocities gets the difference to the message before. Allocates only when the names in the message change.
+  std::variant<Feet, std::string> feet(const JointSample& sample);
+
+ private:
+  struct Chains;
+  std::unique_ptr<Chains> chains_;
+};
+
+}  // namespace kilvo

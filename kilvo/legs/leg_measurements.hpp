@@ -1,0 +1,89 @@
+// The leg measurement (paper, Eqs. 4 to 8): a standing foot does not move. Rows of all standing feet are stacked in one update.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "kilvo/filter/measurement_rows.hpp"
+#include "kilvo/legs/contact_estimator.hpp"
+#include "kilvo/legs/leg_config.hpp"
+#include "kilvo/legs/leg_kinematics.hpp"
+
+namespace kilvo {
+
+/// What one leg sample says about one foot.
+struct Stance {
+  bool begins = false;                             // from now on its contact position is part of the state
+  bool ends = false;                               // from now on it is not
+  bool used = false;                               // it stands: rows are made of it
+  SolePoint point;                                 // on which it stands; IMU frame
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero(); // from where the point was in the sole before to where it is now; IMU frame, m
+  double looseness = 1;                            // factor on the variance of its rows (Eq. 8)
+  SO3 R_IF;
+};
+
+/// One leg sample, ready for the filter: it can be applied again when the state before it has been corrected.
+struct LegStep {
+  Time t{};
+  double dt = 0;  // since the sample before, s
+  std::array<Stance, 2> foot;
+};
+
+/// r = v + R (omega x p + v_fk), the velocity of the contact point in the world (Eq. 5, first row); J over (R, p, v, bg).
+struct FootVelocityRow {
+  Eigen::Vector3d r;
+  Eigen::Matrix3d J_R, J_v, J_bg;
+};
+/// `gyro`: as measured, rad/s.
+FootVelocityRow foot_velocity(const State& x, const SolePoint& point, const Eigen::Vector3d& gyro);
+
+/// r = p + R p_fk - p_c (Eq. 5, second row, in the world); J over (R, p, p_c).
+struct FootPositionRow {
+  Eigen::Vector3d r;
+  Eigen::Matrix3d J_R, J_p, J_pc;
+};
+FootPositionRow foot_position(const State& x, const SolePoint& point, const Eigen::Vector3d& pc);
+
+/// The model that `update` calls: velocity and position of each standing foot that passes the gate.
+class LegModel {
+ public:
+  LegModel(const LegStep& step, const Eigen::Vector3d& gyro, const LegConfig& config) : step_(step), gyro_(gyro), config_(config) {}
+
+  Rows<12> operator()(const State& x, const Covariance& prior);
+
+  /// Of the last evaluation: which feet passed.
+  const std::array<bool, 2>& passed() const { return passed_; }
+
+ private:
+  const LegStep& step_;
+  Eigen::Vector3d gyro_;
+  const LegConfig& config_;
+  std::array<bool, 2> passed_ = {false, false};
+};
+
+/// Puts the contact position of a foot into the state: mean, covariance and cross-covariance from the pose and the kinematics.
+void begin_stance(Estimate& e, std::size_t side, const SolePoint& point, const LegConfig& config);
+/// Takes it out: its rows and columns become zero.
+void end_stance(Estimate& e, std::size_t side);
+
+/// Turns contacts into stances: when a foot enters and leaves the filter, and on which point of its sole it stands.
+class StanceTracker {
+ public:
+  explicit StanceTracker(const LegConfig& config) : config_(config) {}
+
+  /// `omega`: bias-free, rad/s.
+  LegStep step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega);
+
+  /// Both feet leave the filter at the next step, to enter anew.
+  void restart();
+  bool standing(std::size_t side) const { return weights_[side].has_value(); }
+
+ private:
+  using Weights = std::array<double, max_corners>;
+  LegConfig config_;
+  std::optional<Time> last_;
+  std::array<std::optional<Weights>, 2> weights_;  // of each standing foot
+  std::array<bool, 2> leave_ = {false, false};
+};
+
+}  // namespace kilvo
