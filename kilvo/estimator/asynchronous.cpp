@@ -78,6 +78,7 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   replay_.apply(*estimate_, step);
   keep_finite();
   // A sample of the IMU's own time belongs before the interval that begins there.
+  if (s.t == anchor_.t) anchor_ = *estimate_;
   if (s.t == closed_.t) closed_ = *estimate_;
   const double after_us = watch.lap_us();
 
