@@ -6,13 +6,29 @@
 
 namespace kilvo {
 
+void Replay::add(const ImuSample& s) {
+  constexpr double memory = 2.0;  // s
+  const double share = imu_.empty() ? 1.0 : std::min(1.0, to_seconds(s.t - imu_.back().t) / memory);
+  const Eigen::Vector3d gyro = s.gyro - gyro_mean_, accel = s.accel - accel_mean_;
+  gyro_mean_ += share * gyro;
+  accel_mean_ += share * accel;
+  if (!imu_.empty()) {
+    gyro_variance_ += share * (gyro.cwiseAbs2() - gyro_variance_);
+    accel_variance_ += share * (accel.cwiseAbs2() - accel_variance_);
+  }
+  imu_.push_back(s);
+}
+
 // The closed interval [begin, end] between two samples; when nobody saw the motion in between, with noise that says so.
 ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const {
   ImuInterval interval = ImuInterval::between(a, b, begin, end);
   const double gap = to_seconds(b.t - a.t);
   if (gap <= config_.max_imu_gap) return interval;
-  constexpr double unknown_accel = 3.0;  // m/s^2, constant over the gap: as a density, times the gap
-  interval.noise_scale = unknown_accel * unknown_accel * gap / (config_.noise.accel * config_.noise.accel);
+  // What was missed is about what varied before, constant over the gap: as a density, times the gap.
+  constexpr double least_gyro = 0.02, least_accel = 0.2;  // rad/s, m/s^2
+  const double gyro2 = gyro_variance_.sum() + least_gyro * least_gyro, accel2 = accel_variance_.sum() + least_accel * least_accel;
+  interval.gyro_scale = gyro2 * gap / (config_.noise.gyro * config_.noise.gyro);
+  interval.accel_scale = accel2 * gap / (config_.noise.accel * config_.noise.accel);
   constexpr double blind = 1.0;  // s; after longer than this the two samples say nothing of the time between
   if (gap > blind) {
     interval.gyro_begin = interval.gyro_end = x.bg;

@@ -15,7 +15,7 @@ class Replay {
   explicit Replay(const EstimatorConfig& config) : config_(config) {}
 
   /// In time order, each kind by itself.
-  void add(const ImuSample& s) { imu_.push_back(s); }
+  void add(const ImuSample& s);
   void add(const LegStep& s) { steps_.push_back(s); }
 
   bool has_imu() const { return !imu_.empty(); }
@@ -43,6 +43,9 @@ class Replay {
   EstimatorConfig config_;
   std::deque<ImuSample> imu_;
   std::deque<LegStep> steps_;
+  // Of the last seconds of the IMU.
+  Eigen::Vector3d gyro_mean_ = Eigen::Vector3d::Zero(), accel_mean_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gyro_variance_ = Eigen::Vector3d::Zero(), accel_variance_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace kilvo

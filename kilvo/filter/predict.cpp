@@ -51,15 +51,15 @@ ForceJacobians jacobians_of(const State& x, const Motion& m) {
   return j;
 }
 
-void add_process_noise(Covariance& P, const Motion& m, const FootOrientations& feet, const ProcessNoise& n, double scale) {
+void add_process_noise(Covariance& P, const Motion& m, const FootOrientations& feet, const ProcessNoise& n, const ImuInterval& interval) {
   const double dt = m.dt;
   const auto add = [&P](int row, int col, double value) { P.diagonal(col - row).segment<3>(std::min(row, col)).array() += value; };
-  const double accel = scale * n.accel * n.accel;
-  add(at::R, at::R, scale * n.gyro * n.gyro * dt);
+  const double accel = interval.accel_scale * n.accel * n.accel;
+  add(at::R, at::R, interval.gyro_scale * n.gyro * n.gyro * dt);
   add(at::v, at::v, accel * dt);
   add(at::p, at::v, accel * dt * dt / 2);
   add(at::v, at::p, accel * dt * dt / 2);
-  add(at::p, at::p, accel * dt * dt * dt / 3 + scale * n.velocity * n.velocity * dt);
+  add(at::p, at::p, accel * dt * dt * dt / 3 + interval.accel_scale * n.velocity * n.velocity * dt);
   add(at::bg, at::bg, n.gyro_bias * n.gyro_bias * dt);
   add(at::ba, at::ba, n.accel_bias * n.accel_bias * dt);
   for (int foot = 0; foot < 2; ++foot) {
@@ -126,7 +126,7 @@ Estimate predict(const Estimate& e, const ImuInterval& interval, const FootOrien
   out.P.topRightCorner<9, at::size - 9>() = M.rightCols<at::size - 9>();
   out.P.bottomLeftCorner<at::size - 9, 9>() = M.rightCols<at::size - 9>().transpose();
   out.P.topLeftCorner<9, 9>() = 0.5 * (N + N.transpose());
-  add_process_noise(out.P, m, feet, noise, interval.noise_scale);
+  add_process_noise(out.P, m, feet, noise, interval);
   return out;
 }
 

@@ -16,7 +16,7 @@ struct ImuInterval {
   Time begin{}, end{};
   Eigen::Vector3d gyro_begin, gyro_end;    // rad/s
   Eigen::Vector3d accel_begin, accel_end;  // m/s^2
-  double noise_scale = 1;                  // multiplies the variance of rate and specific force (saturation, gaps)
+  double gyro_scale = 1, accel_scale = 1;  // multiply the variances of rate and of specific force (gaps)
 
   /// The latest sample, held.
   static ImuInterval hold(const ImuSample& s, Time begin, Time end) { return {begin, end, s.gyro, s.gyro, s.accel, s.accel}; }
@@ -32,7 +32,7 @@ struct ProcessNoise {
   double velocity = 8e-4;    // m/s/sqrt(Hz)
   double gyro_bias = 2e-5;   // rad/s/sqrt(s)
   double accel_bias = 3e-4;  // m/s^2/sqrt(s)
-  double foot = 0.01;        // m/sqrt(s), of a standing foot, each axis of the foot frame
+  double foot = 0.003;       // m/sqrt(s), of a standing foot, each axis of the foot frame
   double exposure = 0.05;    // 1/sqrt(s)
 
   static constexpr auto fields() {

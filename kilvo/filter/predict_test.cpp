@@ -166,7 +166,7 @@ Estimate one_second(double rate, double scale = 1) {
   const FootOrientations standing = {SO3(), SO3()};
   for (int i = 0; i < static_cast<int>(rate); ++i) {
     ImuInterval interval = ImuInterval::hold({e.t, {0.3, -0.2, 0.5}, {0.5, 1, 9.5}}, e.t, begin_time + from_seconds((i + 1) / rate));
-    interval.noise_scale = scale;
+    interval.gyro_scale = interval.accel_scale = scale;
     e = predict(e, interval, standing, {});
   }
   return e;
