@@ -21,9 +21,9 @@ int report(const ReportWords& words) {
   if (!words.truth.empty()) options.truth = words.truth;
   if (!words.true_contacts.empty()) options.true_contacts = words.true_contacts;
   const lab::Report made = lab::make_report(options);
-  if (!made.left_out.empty()) fmt::print(stderr, "kilvo: not in the folder, so not in the report: {}\n", fmt::join(made.left_out, ", "));
   const std::filesystem::path path = options.folder / "report.html";
   write_text_file(path, made.html);
+  if (!made.left_out.empty()) fmt::print(stderr, "kilvo: not in the folder, so not in the report: {}\n", fmt::join(made.left_out, ", "));
   fmt::print("{}\n", path.string());
   return done;
 }

@@ -31,7 +31,7 @@ Json strip(const TimeBase& time, std::span<const ContactSample> estimate, std::s
   Json out = figure("strip", "contacts", "feet", "Contacts", note);
   out["rows"] = Json::array();
   for (const Foot foot : {left_foot, right_foot}) {
-    out["rows"].push_back({{"label", foot_names[foot]}, {"spans", spans(time, estimate, foot)}});
+    if (!estimate.empty()) out["rows"].push_back({{"label", foot_names[foot]}, {"spans", spans(time, estimate, foot)}});
     if (!truth.empty()) {
       Json real = spans(time, truth, foot);
       for (Json& span : real) span[2] = "truth";

@@ -41,6 +41,14 @@ std::string in_html(const Json& json) {
   return text;
 }
 
+/// The recording's name without folders and ending; the folder's where that is not known.
+std::string title_of(const RunFiles& run) {
+  if (!run.summary.contains("input") || !run.summary["input"].is_string()) return run.name;
+  std::filesystem::path input = run.summary["input"].get<std::string>();
+  if (!input.has_filename()) input = input.parent_path();
+  return input.has_stem() ? input.stem().string() : run.name;
+}
+
 Json warnings_of(const nlohmann::json& summary) {
   Json out = Json::array();
   if (summary.contains("failure") && summary["failure"].is_string()) out.push_back(summary["failure"].get<std::string>());
@@ -66,7 +74,8 @@ Report make_report(const ReportOptions& options) {
   }
 
   Json page;
-  page["name"] = run.name;
+  page["name"] = title_of(run);
+  page["folder"] = run.name;
   page["version"] = run.summary.contains("version") && run.summary["version"].is_string() ? run.summary["version"].get<std::string>() : "";
   page["input"] = run.summary.contains("input") && run.summary["input"].is_string() ? run.summary["input"].get<std::string>() : "";
   page["headlines"] = headlines(run, way, contacts);

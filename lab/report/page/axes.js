@@ -26,7 +26,7 @@ function scale(domain, range) {
 /** Horizontal grid lines with labels at the left of `box` {left, right, top, bottom}. */
 function drawYAxis(parent, box, domain) {
   const toY = scale(domain, [box.bottom, box.top]);
-  const {values, step} = ticks(domain[0], domain[1], Math.max(2, (box.bottom - box.top) / 34));
+  const {values, step} = ticks(domain[0], domain[1], Math.max(3, (box.bottom - box.top) / 24));
   for (const value of values) {
     const y = toY(value).toFixed(1);
     const zero = Math.abs(value) < step * 1e-6 && domain[0] < 0;

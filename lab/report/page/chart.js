@@ -14,7 +14,11 @@ function yDomain(panel, domain) {
   let low = Infinity, high = -Infinity;
   const take = (y) => { if (y !== null) { low = Math.min(low, y); high = Math.max(high, y); } };
   for (const line of panel.lines) for (let [i, end] = visible(line.x, domain); i < end; ++i) take(line.y[i]);
-  for (const band of panel.bands) for (let [i, end] = visible(band.x, domain); i < end; ++i) if (band.y[i] !== null) { take(band.y[i]); take(-band.y[i]); }
+  for (const band of panel.bands) {
+    // Its 98th percentile: one wide moment must not flatten the rest.
+    const widths = band.y.slice(...visible(band.x, domain)).filter((y) => y !== null).sort((a, b) => a - b);
+    if (widths.length) { take(widths[Math.floor((widths.length - 1) * 0.98)]); take(-widths[Math.floor((widths.length - 1) * 0.98)]); }
+  }
   return padded(low, high);
 }
 
@@ -31,7 +35,7 @@ function drawLines(parent, panel, toX, toY, domain) {
   for (const line of panel.lines) {
     const path = pathOf(...part(line), toX, toY);
     points += path.points;
-    parent.append(svg('path', {class: 'line', d: path.text, style: `stroke: ${colour(line.role)}`}));
+    parent.append(svg('path', {class: line.role === 'truth' ? 'line truth' : 'line', d: path.text, style: `stroke: ${colour(line.role)}`}));
   }
   return points;
 }

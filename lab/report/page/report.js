@@ -17,7 +17,7 @@ function wholeTime(figures) {
 function drawHead(data) {
   document.title = `KILVO: ${data.name}`;
   document.getElementById('name').textContent = data.name;
-  const parts = [data.input && `from ${data.input}`, data.version && `KILVO ${data.version}`,
+  const parts = [`results in ${data.folder}`, data.input && `of ${data.input}`, data.version && `KILVO ${data.version}`,
                  data.has_truth ? 'compared with the truth' : 'no truth was given, so there are no errors to show'];
   document.getElementById('about').textContent = parts.filter(Boolean).join(' · ');
   const main = document.getElementById('main');
@@ -29,7 +29,7 @@ function drawHead(data) {
   return main;
 }
 
-/** What has been drawn, for whoever checks the page: {figures: {id: number of things drawn}, errors: [text]}. */
+/** What has been drawn, for whoever checks the page: {figures: {id: number of things drawn}, errors: [text], width, window: pixels}. */
 function drawReport() {
   const data = JSON.parse(document.getElementById('data').textContent), drawn = {figures: {}, errors: []};
   const main = drawHead(data);
@@ -54,6 +54,8 @@ function drawReport() {
       }
     }
   }
+  drawn.width = document.documentElement.scrollWidth;
+  drawn.window = window.innerWidth;
   document.body.append(el('footer', {}, data.missing.length ? `Not in the folder, so not shown: ${data.missing.join(', ')}. ` : '',
                           'Times count from the first output. Drag over a figure with the mouse to see a part of the time in all of them.'),
                        el('script', {type: 'application/json', id: 'drawn'}, JSON.stringify(drawn)));

@@ -2,7 +2,7 @@
 
 /** What fills a span of this class: a colour of the style sheet, or for the modalities one for each. */
 function spanColour(name) {
-  const modalities = {KILV: 'var(--c0)', KIL: 'var(--c2)', KI: 'var(--c1)', LIV: 'var(--c3)', LI: 'var(--c5)', COAST: 'var(--bad)'};
+  const modalities = {KILV: 'var(--c2)', KIL: 'var(--c0)', KI: 'var(--c1)', LIV: 'var(--c3)', LI: 'var(--c5)', COAST: 'var(--bad)'};
   return modalities[name.toUpperCase()] || (['left', 'right', 'truth'].includes(name) ? colour(name) : 'var(--c4)');
 }
 

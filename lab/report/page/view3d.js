@@ -37,6 +37,21 @@ function pointColours(figure, points, mode) {
   return colours;
 }
 
+/** How far apart the points are: the median distance to the nearest other one, of some of them. */
+function spacingOf(points) {
+  const n = points.length / 3, samples = Math.min(120, n), distances = [];
+  for (let s = 0; s < samples; ++s) {
+    const i = 3 * Math.floor((s + 0.5) * n / samples);
+    let nearest = Infinity;
+    for (let k = 0; k < points.length; k += 3) {
+      const d = (points[k] - points[i]) ** 2 + (points[k + 1] - points[i + 1]) ** 2 + (points[k + 2] - points[i + 2]) ** 2;
+      if (d < nearest && k !== i) nearest = d;
+    }
+    distances.push(Math.sqrt(nearest));
+  }
+  return distances.sort((a, b) => a - b)[samples >> 1] || 0.05;
+}
+
 /** Where the eye is: around `target` at `distance`, `yaw` and `pitch` in rad. */
 function makeCamera(figure, walked) {
   const middle = (k) => walked ? (Math.min(...walked[k]) + Math.max(...walked[k])) / 2 : null;
@@ -57,8 +72,9 @@ class PointView {
   constructor(figure, canvas) {
     this.figure = figure;
     this.canvas = canvas;
-    this.context = canvas.getContext('2d');
+    this.context = canvas.getContext('2d', {willReadFrequently: true});  // pixels are put, not drawn: keep them with the processor
     this.points = unpackPoints(figure);
+    this.spacing = spacingOf(this.points);
     this.walked = figure.lines.find((line) => line.role === 'estimate');
     this.camera = makeCamera(figure, this.walked);
     this.cut = Infinity;
@@ -99,7 +115,7 @@ class PointView {
 
   splat(pixels, depths, w, h) {
     const {points, colours, cut} = this, [r, u, f] = this.camera.axes(), [tx, ty, tz] = this.camera.target, distance = this.camera.distance;
-    const focal = 0.9 * Math.max(w, h), spacing = 0.06 * focal;
+    const focal = 0.9 * Math.max(w, h), spacing = 1.7 * this.spacing * focal;
     let seen = 0;
     for (let i = 0, k = 0; i < colours.length; ++i, k += 3) {
       if (points[k + 2] > cut) continue;
@@ -107,7 +123,7 @@ class PointView {
       const depth = distance - (f[0] * dx + f[1] * dy + f[2] * dz);
       if (depth < 0.2) continue;
       const px = (w / 2 + focal * (r[0] * dx + r[1] * dy) / depth) | 0, py = (h / 2 - focal * (u[0] * dx + u[1] * dy + u[2] * dz) / depth) | 0;
-      const size = Math.max(1, Math.min(5, Math.round(spacing / depth)));
+      const size = Math.max(1, Math.min(8, Math.round(spacing / depth)));
       if (px < 0 || py < 0 || px + size > w || py + size > h) continue;
       ++seen;
       for (let y = py; y < py + size; ++y) {
