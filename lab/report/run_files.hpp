@@ -19,8 +19,8 @@ namespace kilvo::lab {
 /// A row of states.csv: world frame and SI units; sigmas of position (world axes, m) and attitude (body axes, rad) relative to the start.
 struct StateRow {
   Time t{};
-  Eigen::Vector3d v, bg, ba;
-  Eigen::Vector3d sigma_p, sigma_R;  // NaN when the file has none
+  Eigen::Vector3d v = Eigen::Vector3d::Zero(), bg = v, ba = v;
+  Eigen::Vector3d sigma_p = v, sigma_R = v;  // NaN when the file has none
 };
 
 /// A row of contacts.csv.
