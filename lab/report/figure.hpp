@@ -1,5 +1,5 @@
 // What the page draws: figures as JSON. The page (lab/report/page/) knows six kinds; see the functions of the same names there.
-//   lines  panels over time: {panels: [{label, unit, lines: [{name, role, x, y}], bands: [{name, role, x, y}]}]}
+//   lines  panels over time: {panels: [{label, unit, from_zero, lines: [{name, role, x, y}], bands: [{name, role, x, y}]}]}
 //   plane  curves with equal scales: {x_label, y_label, equal, lines}
 //   strip  what was on when: {rows: [{label, spans: [[begin, end, class, text]]}]}
 //   bars   a histogram: {x_label, log, edges, groups: [{name, role, counts}]}

@@ -47,7 +47,7 @@ Figures modality_figures(const TimeBase& time, const RunFiles& run);
 Figures rate_figures(const TimeBase& time, const RunFiles& run);
 Figures stage_figures(const TimeBase& time, const std::vector<StageRow>& timing);
 Figures map_figures(const TimeBase& time, const Cloud& map, const Way& way);
-Figures summary_figures(const nlohmann::json& summary);
+Figures summary_figures(const Json& summary);
 
 /// The numbers on top: {label, value, unit, note, bad}.
 Json headlines(const RunFiles& run, const Way& way, const std::optional<ContactEvaluation>& contacts);

@@ -151,7 +151,7 @@ TEST(Figures, WithoutDataThereAreNone) {
   EXPECT_THAT(rate_figures(time_base, nothing), IsEmpty());
   EXPECT_THAT(stage_figures(time_base, {}), IsEmpty());
   EXPECT_THAT(map_figures(time_base, {}, way), IsEmpty());
-  EXPECT_THAT(summary_figures(nlohmann::json::object()), IsEmpty());
+  EXPECT_THAT(summary_figures(Json::object()), IsEmpty());
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ std::string title_of(const RunFiles& run) {
   return input.has_stem() ? input.stem().string() : run.name;
 }
 
-Json warnings_of(const nlohmann::json& summary) {
+Json warnings_of(const Json& summary) {
   Json out = Json::array();
   if (summary.contains("failure") && summary["failure"].is_string()) out.push_back(summary["failure"].get<std::string>());
   if (summary.contains("warnings") && summary["warnings"].is_array())

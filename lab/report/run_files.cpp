@@ -90,9 +90,9 @@ Cloud read_map(const fs::path& path) {
   }
 }
 
-nlohmann::json read_summary(const fs::path& path) {
+nlohmann::ordered_json read_summary(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
-  nlohmann::json json = nlohmann::json::parse(in, nullptr, false);
+  nlohmann::ordered_json json = nlohmann::ordered_json::parse(in, nullptr, false);
   if (!json.is_object()) throw ReportError(path.string() + ": is not a JSON object");
   return json;
 }
@@ -109,7 +109,7 @@ RunFiles read_run_files(const fs::path& folder) {
   const fs::path full = fs::weakly_canonical(folder, error);
   run.name = (full.has_filename() ? full.filename() : full.parent_path().filename()).string();
   run.odometry = read_tum(folder / "odometry.tum");
-  run.summary = nlohmann::json::object();
+  run.summary = nlohmann::ordered_json::object();
   const auto read = [&](const char* name, auto& into, auto&& reader) {
     if (fs::exists(folder / name, error))
       into = reader(folder / name);

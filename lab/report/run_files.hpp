@@ -48,7 +48,7 @@ struct RunFiles {
   std::vector<ModalityRow> modality;
   std::vector<StageRow> timing;
   Cloud map;
-  nlohmann::json summary;            // an object, empty when the file is not there
+  nlohmann::ordered_json summary;    // an object, empty when the file is not there
   std::vector<std::string> missing;  // names of files
 };
 

@@ -47,7 +47,7 @@ std::vector<std::size_t> longest(const std::vector<double>& ms) {
 Json interval_panel(const char* label, const char* role, const Intervals& intervals) {
   const std::vector<std::size_t> kept = longest(intervals.ms);
   const Json curve = line("interval", role, column(intervals.t, kept, 3), column(intervals.ms, kept, 3));
-  return {{"label", label}, {"unit", "ms"}, {"lines", Json::array({curve})}, {"bands", Json::array()}};
+  return {{"label", label}, {"unit", "ms"}, {"lines", Json::array({curve})}, {"bands", Json::array()}, {"from_zero", true}};
 }
 
 Json output_row(const char* name, std::size_t n, const Intervals& intervals, double seconds) {
@@ -60,13 +60,13 @@ Json output_row(const char* name, std::size_t n, const Intervals& intervals, dou
 }
 
 /// What a JSON object holds under `key`; null where that is not there or `json` is no object.
-nlohmann::json at(const nlohmann::json& json, const char* key) {
+Json at(const Json& json, const char* key) {
   if (!json.is_object() || !json.contains(key)) return nullptr;
   return json[key];
 }
 
-Json message_row(const std::string& sensor, const nlohmann::json& messages, double seconds) {
-  const nlohmann::json used = at(messages, "used"), dropped = at(messages, "dropped"), topic = at(messages, "topic");
+Json message_row(const std::string& sensor, const Json& messages, double seconds) {
+  const Json used = at(messages, "used"), dropped = at(messages, "dropped"), topic = at(messages, "topic");
   std::string causes;
   if (dropped.is_object())
     for (const auto& [cause, n] : dropped.items()) causes += (causes.empty() ? "" : ", ") + n.dump() + " " + cause;
@@ -82,7 +82,7 @@ double seconds_of(const std::vector<StampedPose>& poses) { return poses.size() <
 
 Figures rate_figures(const TimeBase& time, const RunFiles& run) {
   Figures figures;
-  const nlohmann::json messages = at(run.summary, "messages");
+  const Json messages = at(run.summary, "messages");
   if (messages.is_object() && !messages.empty()) {
     Json table = figure("table", "messages", "senses", "Messages used", "By sensor; what was dropped, and why.");
     table["columns"] = {"sensor", "topic", "used", "Hz", "dropped"};

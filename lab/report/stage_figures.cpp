@@ -75,7 +75,8 @@ Figures stage_figures(const TimeBase& time, const std::vector<StageRow>& timing)
     const auto kept = thin(std::span(&stage.us, 1), buckets);
     lines.push_back(line(name, std::to_string(number++), column(stage.t, kept, 3), column(stage.us, kept, 1)));
   }
-  over_time["panels"] = Json::array({{{"label", "stage"}, {"unit", "µs"}, {"lines", std::move(lines)}, {"bands", Json::array()}}});
+  over_time["panels"] =
+      Json::array({{{"label", "stage"}, {"unit", "µs"}, {"lines", std::move(lines)}, {"bands", Json::array()}, {"from_zero", true}}});
   return {over_time, histogram(stages), table(stages)};
 }
 

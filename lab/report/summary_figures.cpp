@@ -14,12 +14,12 @@ void add(Json& cards, const Headline& h) {
   cards.push_back({{"label", h.label}, {"value", h.value}, {"unit", h.unit}, {"note", h.note}, {"bad", h.bad}});
 }
 
-std::optional<double> number(const nlohmann::json& json, const char* key) {
+std::optional<double> number(const Json& json, const char* key) {
   if (!json.is_object() || !json.contains(key) || !json[key].is_number()) return std::nullopt;
   return json[key].get<double>();
 }
 
-bool is_true(const nlohmann::json& json, const char* key) { return json.is_object() && json.contains(key) && json[key] == true; }
+bool is_true(const Json& json, const char* key) { return json.is_object() && json.contains(key) && json[key] == true; }
 
 /// A length in mm below 1 m.
 std::pair<std::string, std::string> length(double metres) {
@@ -38,7 +38,7 @@ void add_errors(Json& cards, const Evaluation& e) {
 }
 
 /// name, value; the names of what lies deeper are joined by dots.
-void flatten(const nlohmann::json& json, const std::string& name, Json& rows) {
+void flatten(const Json& json, const std::string& name, Json& rows) {
   if (json.is_object()) {
     for (const auto& [key, value] : json.items()) flatten(value, name.empty() ? key : name + "." + key, rows);
   } else if (json.is_array()) {
@@ -80,12 +80,12 @@ Json headlines(const RunFiles& run, const Way& way, const std::optional<ContactE
   return cards;
 }
 
-Figures summary_figures(const nlohmann::json& summary) {
+Figures summary_figures(const Json& summary) {
   if (summary.empty()) return {};
   Json table = figure("table", "summary", "all", "Summary", "All of summary.json but the configuration.");
   table["columns"] = {"", ""};
   table["rows"] = Json::array();
-  nlohmann::json rest = summary;
+  Json rest = summary;
   rest.erase("config");
   flatten(rest, "", table["rows"]);
   table["plain"] = true;

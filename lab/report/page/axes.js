@@ -43,7 +43,7 @@ function drawXAxis(parent, box, domain, label) {
   for (const value of values) {
     const x = toX(value).toFixed(1);
     parent.append(svg('line', {class: 'grid', x1: x, x2: x, y1: box.top, y2: box.bottom}));
-    if (label !== null && toX(value) < box.right - 24) {
+    if (label !== null && toX(value) < box.right - 14 - 6 * label.length) {
       parent.append(svg('text', {x, y: box.bottom + 15, 'text-anchor': 'middle'}, tickLabel(value, step)));
     }
   }

@@ -1,6 +1,6 @@
 // Curves: over time in panels below each other, and in a plane.
 
-const left = 58, right = 10;
+const left = 64, right = 10;  // pixels beside every figure, so that times lie above each other
 
 /** Where the visible part of sorted times begins and ends (exclusive), with one point more on each side. */
 function visible(xs, domain) {
@@ -19,6 +19,7 @@ function yDomain(panel, domain) {
     const widths = band.y.slice(...visible(band.x, domain)).filter((y) => y !== null).sort((a, b) => a - b);
     if (widths.length) { take(widths[Math.floor((widths.length - 1) * 0.98)]); take(-widths[Math.floor((widths.length - 1) * 0.98)]); }
   }
+  if (panel.from_zero) take(0);
   return padded(low, high);
 }
 

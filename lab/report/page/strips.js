@@ -16,7 +16,7 @@ function drawStrip(figure, parent) {
   const draw = () => {
     let drawn = 0;
     canvas.replaceChildren();
-    box = {left: left + 14, right: Math.max(left + 74, parent.clientWidth - right), top: 2, bottom: height - 22};
+    box = {left, right: Math.max(left + 60, parent.clientWidth - right), top: 2, bottom: height - 22};
     toX = drawXAxis(canvas, box, timeView.domain, 's');
     figure.rows.forEach((row, index) => {
       const y = box.top + 2 + index * (rowHeight + gap);
@@ -94,7 +94,7 @@ function drawLogAxis(parent, box, toX, label) {
       const x = toX(Math.log10(m * 10 ** power));
       if (x < box.left || x > box.right) continue;
       parent.append(svg('line', {class: 'grid', x1: x, x2: x, y1: box.top, y2: box.bottom}));
-      if (x < box.right - 24) parent.append(svg('text', {x, y: box.bottom + 15, 'text-anchor': 'middle'}, tickLabel(m * 10 ** power, 10 ** power)));
+      if (x < box.right - 14 - 6 * label.length) parent.append(svg('text', {x, y: box.bottom + 15, 'text-anchor': 'middle'}, tickLabel(m * 10 ** power, 10 ** power)));
     }
   }
   parent.append(svg('line', {class: 'axis', x1: box.left, x2: box.right, y1: box.bottom, y2: box.bottom}));
@@ -112,7 +112,7 @@ function drawTable(figure, parent) {
   for (const row of figure.rows) {
     body.append(el('tr', {}, ...row.map((value, i) => {
       cells += value === null || value === '' ? 0 : 1;
-      return el('td', kind[i], typeof value === 'number' ? (Number.isInteger(value) ? String(value) : show(value)) : value === null ? '–' : String(value));
+      return el('td', kind[i], typeof value === 'number' ? String(value).replace('-', '\u2212') : value === null ? '–' : String(value));
     })));
   }
   table.append(body);

@@ -58,7 +58,7 @@ function makeCamera(figure, walked) {
   const size = [0, 1, 2].map((k) => figure.high[k] - figure.low[k]);
   return {
     target: ['x', 'y', 'z'].map((name, k) => walked ? middle(name) : figure.low[k] + size[k] / 2),
-    distance: Math.min(1.15 * Math.hypot(size[0], size[1]) + 1, walked ? 14 + 1.3 * Math.hypot(...['x', 'y'].map((k) => Math.max(...walked[k]) - Math.min(...walked[k]))) : 1e9),
+    distance: Math.min(1.15 * Math.hypot(size[0], size[1]) + 1, walked ? 15 + 1.5 * Math.hypot(...['x', 'y'].map((k) => Math.max(...walked[k]) - Math.min(...walked[k]))) : 1e9),
     yaw: -0.9, pitch: 0.75,
     /** Rows: right, up, towards the eye. */
     axes() {
