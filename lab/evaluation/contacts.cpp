@@ -196,12 +196,13 @@ std::vector<Stance> stances(std::span<const ContactSample> samples, Foot foot) {
     const bool connected = i > 0 && samples[i].t - samples[i - 1].t <= bridge;
     if (!connected) down = false;
     if (samples[i].down[foot] && !down) {
-      found.emplace_back();
+      found.emplace_back().first = samples[i].t;
       if (connected) found.back().begin = middle(samples[i - 1].t, samples[i].t);
     } else if (!samples[i].down[foot] && down) {
       found.back().end = middle(samples[i - 1].t, samples[i].t);
     }
     down = samples[i].down[foot];
+    if (down) found.back().last = samples[i].t;
   }
   return found;
 }

@@ -29,6 +29,7 @@ std::vector<ContactSample> read_contacts(const std::filesystem::path& path);
 /// two sampling rates do not look like a delay. What was already so at the first sample, or is still so at the last, has no such end.
 struct Stance {
   std::optional<Time> begin, end;
+  Time first{}, last{};  // of its samples
 };
 std::vector<Stance> stances(std::span<const ContactSample> samples, Foot foot);
 

@@ -46,6 +46,10 @@ TEST(Contacts, ATransitionLiesBetweenItsSamples) {
   EXPECT_FALSE(list[0].begin);
   EXPECT_EQ(list[0].end, ms(995));
   EXPECT_EQ(list[1].begin, ms(1395));
+  EXPECT_EQ(list[0].first, ms(0));
+  EXPECT_EQ(list[0].last, ms(990));
+  EXPECT_EQ(list[1].first, ms(1400));
+  EXPECT_EQ(list[1].last, ms(1990));
   EXPECT_FALSE(list[1].end);
 }
 

@@ -9,11 +9,11 @@ namespace {
 
 constexpr std::size_t buckets = 1200;
 
-/// The stances of a foot as [begin, end, class, text], s. What has no end known ends with the samples.
+/// The stances of a foot as [begin, end, class, text], s. What has no end known (legs lost) ends with its samples.
 Json spans(const TimeBase& time, std::span<const ContactSample> samples, Foot foot) {
   Json out = Json::array();
   for (const Stance& stance : stances(samples, foot)) {
-    const double begin = time.seconds(stance.begin.value_or(samples.front().t)), end = time.seconds(stance.end.value_or(samples.back().t));
+    const double begin = time.seconds(stance.begin.value_or(stance.first)), end = time.seconds(stance.end.value_or(stance.last));
     out.push_back({rounded(begin, 3), rounded(end, 3), foot_names[foot], "in contact"});
   }
   return out;

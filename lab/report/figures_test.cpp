@@ -127,6 +127,21 @@ TEST(Figures, EachStageIsCountedOnce) {
   EXPECT_EQ(figures[2]["rows"][0], Json({"lidar", 999.0, 1489.0, 1499.0, 1000}));
 }
 
+TEST(Figures, WhereLegsAreLostNoFootStands) {
+  std::vector<ContactRow> contacts;  // left is down but from 2 to 3 s; nothing is known from 4 to 6 s
+  for (int i = 0; i < 800; ++i)
+    if (i < 400 || i >= 600) contacts.push_back({{at(0.01 * i), {i < 200 || i >= 300, true}}, {0.01, NAN}});
+  const Figures figures = contact_figures(time_base, contacts, {}, {});
+  ASSERT_THAT(figures, SizeIs(2));  // strip and clearance
+  const Json& left = figures[0]["rows"][0]["spans"];
+  ASSERT_THAT(left, SizeIs(3));
+  EXPECT_THAT(left[0], ElementsAre(0.0, 1.995, "left", "in contact"));
+  EXPECT_THAT(left[1], ElementsAre(2.995, 3.99, "left", "in contact"));
+  EXPECT_THAT(left[2], ElementsAre(6.0, 7.99, "left", "in contact"));
+  EXPECT_THAT(figures[0]["rows"][1]["spans"], SizeIs(2));
+  EXPECT_TRUE(figures[1]["panels"][0]["lines"][1]["y"][0].is_null());
+}
+
 TEST(Figures, APointIsWhereItWasTo16Bits) {
   Cloud cloud;
   cloud.points_W = {{-1, -2, -3}, {1, 2, 3}, {0, 0, 0}};
