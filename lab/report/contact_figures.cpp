@@ -45,7 +45,12 @@ Json clearance(const TimeBase& time, const std::vector<ContactRow>& contacts) {
   Json out = figure("lines", "clearance", "feet", "Clearance", "Height of each sole above the ground, as estimated.");
   std::vector<double> t;
   std::vector<std::vector<double>> columns(2);
+  constexpr double lost = 0.1;  // s without a row: nothing is drawn in between
   for (const ContactRow& row : contacts) {
+    if (!t.empty() && time.seconds(row.sample.t) - t.back() > lost) {
+      t.push_back(t.back());
+      for (std::vector<double>& column : columns) column.push_back(NAN);
+    }
     t.push_back(time.seconds(row.sample.t));
     for (const Foot foot : {left_foot, right_foot}) columns[foot].push_back(row.clearance[foot] * 1e3);
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <unordered_set>
 
 namespace kilvo::lab {
@@ -23,6 +24,20 @@ std::vector<std::size_t> one_per_voxel(std::span<const Eigen::Vector3f> points, 
   return kept;
 }
 
+void append_extremes(const std::vector<double>& column, std::size_t begin, std::size_t end, std::vector<std::size_t>& kept) {
+  std::optional<std::size_t> least, greatest, hole;
+  for (std::size_t i = begin; i < end; ++i) {
+    if (std::isnan(column[i])) {
+      if (!hole) hole = i;
+      continue;
+    }
+    if (!least || column[i] < column[*least]) least = i;
+    if (!greatest || column[i] > column[*greatest]) greatest = i;
+  }
+  for (const auto& found : {least, greatest, hole})
+    if (found) kept.push_back(*found);
+}
+
 }  // namespace
 
 std::vector<std::size_t> thin(std::span<const std::vector<double>> columns, std::size_t buckets) {
@@ -33,15 +48,7 @@ std::vector<std::size_t> thin(std::span<const std::vector<double>> columns, std:
   for (std::size_t bucket = 0; bucket < buckets; ++bucket) {
     const std::size_t begin = bucket * rows / buckets, end = (bucket + 1) * rows / buckets;
     kept.push_back(begin);
-    for (const std::vector<double>& column : columns) {
-      std::size_t least = begin, greatest = begin;
-      for (std::size_t i = begin; i < end; ++i) {
-        if (!(column[i] >= column[least])) least = i;
-        if (!(column[i] <= column[greatest])) greatest = i;
-      }
-      kept.push_back(least);
-      kept.push_back(greatest);
-    }
+    for (const std::vector<double>& column : columns) append_extremes(column, begin, end, kept);
   }
   kept.push_back(rows - 1);
   std::sort(kept.begin(), kept.end());

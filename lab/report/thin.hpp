@@ -9,8 +9,8 @@
 namespace kilvo::lab {
 
 /// Indices, in order, of rows such that a line drawn through them looks like the line through all: of each of `buckets` equal parts of the
-/// rows the first row, and for each column those of its least and greatest value; and the last row. NaN is neither. Columns are equally
-/// long.
+/// rows the first row, and for each column those of its least and greatest value and of its first NaN, so that a hole stays a hole; and the
+/// last row. Columns are equally long.
 std::vector<std::size_t> thin(std::span<const std::vector<double>> columns, std::size_t buckets);
 
 /// Indices of at most `limit` points, one for each voxel of a size that makes that so; all points when there are no more. Points with a

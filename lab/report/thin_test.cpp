@@ -25,7 +25,12 @@ TEST(Thin, ASpikeInAnyColumnSurvives) {
   const auto kept = thin(columns, 10);
   EXPECT_THAT(kept, Contains(1234));
   EXPECT_THAT(kept, Contains(8765));
-  EXPECT_LE(kept.size(), 10 * 7 + 1);
+  EXPECT_LE(kept.size(), 10 * 10 + 1);
+}
+
+TEST(Thin, AHoleStaysAHoleAndHidesNoExtreme) {
+  const std::vector<std::vector<double>> columns{{1, 9, NAN, NAN, 2, 0, 3, 4}};
+  EXPECT_THAT(thin(columns, 1), ElementsAre(0, 1, 2, 5, 7));
 }
 
 TEST(Thin, ShortOrEmptyColumnsStayWhole) {
