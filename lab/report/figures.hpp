@@ -14,8 +14,8 @@ namespace kilvo::lab {
 
 /// An estimated way, as even in time as there is one, and what is known of the truth at its stamps.
 struct Way {
-  std::vector<StampedPose> poses;  // sweeps, or the odometry at 20 Hz where sweeps are not there all the time
-  bool of_sweeps = false;
+  std::vector<StampedPose> poses;  // sweeps, and the odometry at 20 Hz wherever there are none for a quarter of a second
+  bool of_sweeps = false;       // at least 98 % of the time after the first sweep: then `evaluation` is of the sweeps, else of the odometry
   std::vector<PosePair> pairs;  // empty without truth
   std::optional<Evaluation> evaluation;
 };

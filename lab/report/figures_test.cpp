@@ -77,6 +77,22 @@ TEST(Figures, WhereSweepsEndTheOdometryIsShown) {
   EXPECT_TRUE(way_of(Walk().run).of_sweeps);
 }
 
+TEST(Figures, AHoleInTheSweepsIsFilledByTheOdometry) {
+  Walk walk;
+  for (int i = 0; i < 5000; ++i) walk.run.odometry.push_back({at(0.001 * i), pose(0.001 * i, 0, 0)});
+  walk.run.odometry.erase(walk.run.odometry.begin(), walk.run.odometry.begin() + 51);
+  EXPECT_EQ(way_of(walk.run).poses.size(), 51);
+  EXPECT_TRUE(way_of(walk.run).of_sweeps);
+  std::erase_if(walk.run.sweeps, [](const StampedPose& s) { return s.t > at(2.05) && s.t < at(3.95); });  // 2.0 to 4.0 s
+  const Way way = way_of(walk.run);
+  EXPECT_FALSE(way.of_sweeps);
+  EXPECT_NEAR(static_cast<double>(way.poses.size()), 51 - 19 + 39, 1);
+  for (std::size_t i = 1; i < way.poses.size(); ++i) {
+    EXPECT_GT(way.poses[i].t, way.poses[i - 1].t);
+    EXPECT_LE(to_seconds(way.poses[i].t - way.poses[i - 1].t), 0.1 + 1e-9);
+  }
+}
+
 TEST(Figures, VelocityStandsBesideThatOfTheTruth) {
   const Walk walk;
   std::vector<StampedPose> truth;

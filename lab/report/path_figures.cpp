@@ -47,19 +47,35 @@ Json plane(const char* id, const char* title, const char* note, const std::vecto
   return out;
 }
 
-Way without_truth(const RunFiles& run) {
-  Way way;
-  const auto seconds = [](const std::vector<StampedPose>& poses) {
-    return poses.size() < 3 ? 0.0 : to_seconds(poses.back().t - poses.front().t);
-  };
-  constexpr double enough = 0.9;  // of the odometry's time; in KI there are no sweeps
-  way.of_sweeps = run.sweeps.size() >= 3 && seconds(run.sweeps) >= enough * seconds(run.odometry);
-  if (way.of_sweeps) {
-    way.poses = run.sweeps;
-  } else {
-    for (const StampedPose& pose : run.odometry)
-      if (way.poses.empty() || pose.t - way.poses.back().t >= even_period) way.poses.push_back(pose);
+/// Appends the odometry after what is there already and before `end`, at 20 Hz.
+void bridge(std::span<const StampedPose> odometry, Time end, std::size_t& next, std::vector<StampedPose>& poses) {
+  for (; next < odometry.size() && odometry[next].t < end; ++next) {
+    const bool far_from_last = poses.empty() || odometry[next].t - poses.back().t >= even_period;
+    if (far_from_last && end - odometry[next].t >= even_period / 2) poses.push_back(odometry[next]);
   }
+}
+
+Way without_truth(const RunFiles& run) {
+  constexpr Duration hole = std::chrono::milliseconds(250);
+  constexpr double enough = 0.98;
+  Way way;
+  if (run.odometry.empty()) return way;
+  std::size_t next = 0;
+  Duration in_holes{0};
+  const Time after_all = run.odometry.back().t + even_period;
+  const auto reach = [&](Time t) {
+    const Time last = way.poses.empty() ? run.odometry.front().t : way.poses.back().t;
+    if (t - last <= hole) return;
+    if (!way.poses.empty()) in_holes += t - last;
+    bridge(run.odometry, t, next, way.poses);
+  };
+  for (const StampedPose& sweep : run.sweeps) {
+    reach(sweep.t);
+    way.poses.push_back(sweep);
+  }
+  reach(after_all);
+  const Duration whole = run.sweeps.empty() ? Duration{0} : run.odometry.back().t - run.sweeps.front().t;
+  way.of_sweeps = run.sweeps.size() >= 3 && to_seconds(in_holes) <= (1 - enough) * to_seconds(whole);
   return way;
 }
 
@@ -70,7 +86,7 @@ Way way_of(const RunFiles& run) { return without_truth(run); }
 Way way_of(const RunFiles& run, std::span<const StampedPose> truth) {
   Way way = without_truth(run);
   way.pairs = match(way.poses, truth);
-  way.evaluation = evaluate(way.of_sweeps ? way.poses : run.odometry, truth, Alignment::se3);
+  way.evaluation = evaluate(way.of_sweeps ? run.sweeps : run.odometry, truth, Alignment::se3);
   return way;
 }
 

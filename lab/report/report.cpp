@@ -82,6 +82,7 @@ Report make_report(const ReportOptions& options) {
   page["warnings"] = warnings_of(run.summary);
   page["missing"] = run.missing;
   page["has_truth"] = options.truth.has_value();
+  page["of_sweeps"] = way.of_sweeps;
   page["figures"] = Json::array();
   for (Figures& group : std::vector<Figures>{map_figures(time, run.map, way), path_figures(time, way), error_figures(time, way, run.states),
                                              state_figures(time, run.states, truth, way),

@@ -23,6 +23,12 @@ function yDomain(panel, domain) {
   return padded(low, high);
 }
 
+/** How far apart two times are when nothing is known in between: much more than usual, and a second. */
+function holeIn(times) {
+  const steps = times.slice(1).map((t, i) => t - times[i]).sort((a, b) => a - b);
+  return Math.max(1, 8 * (steps[steps.length >> 1] || 0));
+}
+
 function drawLines(parent, panel, toX, toY, domain) {
   let points = 0;
   const part = (line) => { const [begin, end] = visible(line.x, domain); return [line.x.slice(begin, end), line.y.slice(begin, end)]; };
@@ -34,7 +40,7 @@ function drawLines(parent, panel, toX, toY, domain) {
     if (text) parent.append(svg('path', {class: 'band', d: text + 'Z', style: `fill: ${colour(band.role)}`}));
   }
   for (const line of panel.lines) {
-    const path = pathOf(...part(line), toX, toY);
+    const path = pathOf(...part(line), toX, toY, isFinite(domain[0]) ? holeIn(line.x) : Infinity);
     points += path.points;
     parent.append(svg('path', {class: line.role === 'truth' ? 'line truth' : 'line', d: path.text, style: `stroke: ${colour(line.role)}`}));
   }

@@ -59,11 +59,12 @@ const timeView = {
   },
 };
 
-/** Line segments as a path; null starts a new one. Returns the text and how many points it has. */
-function pathOf(xs, ys, toX, toY) {
+/** Line segments as a path; null, and a step of x over `hole`, starts a new one. Returns the text and how many points it has. */
+function pathOf(xs, ys, toX, toY, hole = Infinity) {
   let text = '', pen = false, points = 0;
   for (let i = 0; i < xs.length; ++i) {
     if (xs[i] === null || ys[i] === null) { pen = false; continue; }
+    if (i > 0 && xs[i] - xs[i - 1] > hole) pen = false;
     text += `${pen ? 'L' : 'M'}${toX(xs[i]).toFixed(1)} ${toY(ys[i]).toFixed(1)}`;
     pen = true;
     ++points;

@@ -18,7 +18,7 @@ function drawHead(data) {
   document.title = `KILVO: ${data.name}`;
   document.getElementById('name').textContent = data.name;
   const parts = [`results in ${data.folder}`, data.input && `of ${data.input}`, data.version && `KILVO ${data.version}`,
-                 data.has_truth ? 'compared with the truth' : 'no truth was given, so there are no errors to show'];
+                 data.has_truth ? `compared with the truth at each ${data.of_sweeps ? 'sweep' : 'output'}` : 'no truth was given, so there are no errors to show'];
   document.getElementById('about').textContent = parts.filter(Boolean).join(' · ');
   const main = document.getElementById('main');
   if (data.headlines.length) {
