@@ -29,15 +29,27 @@ function holeIn(times) {
   return Math.max(1, 8 * (steps[steps.length >> 1] || 0));
 }
 
+/** Indices of the values that are known, in runs without a hole. */
+function knownRuns(xs, ys) {
+  const hole = holeIn(xs), runs = [];
+  ys.forEach((y, i) => {
+    if (y === null) return;
+    if (i === 0 || ys[i - 1] === null || xs[i] - xs[i - 1] > hole) runs.push([]);
+    runs[runs.length - 1].push(i);
+  });
+  return runs;
+}
+
 function drawLines(parent, panel, toX, toY, domain) {
   let points = 0;
   const part = (line) => { const [begin, end] = visible(line.x, domain); return [line.x.slice(begin, end), line.y.slice(begin, end)]; };
   for (const band of panel.bands) {
     const [x, y] = part(band);
-    const known = x.map((_, i) => i).filter((i) => y[i] !== null);
-    const outline = known.map((i) => [x[i], y[i]]).concat(known.reverse().map((i) => [x[i], -y[i]]));
-    const {text} = pathOf(outline.map((p) => p[0]), outline.map((p) => p[1]), toX, toY);
-    if (text) parent.append(svg('path', {class: 'band', d: text + 'Z', style: `fill: ${colour(band.role)}`}));
+    for (const run of knownRuns(x, y)) {
+      const outline = run.map((i) => [x[i], y[i]]).concat(run.reverse().map((i) => [x[i], -y[i]]));
+      const {text} = pathOf(outline.map((p) => p[0]), outline.map((p) => p[1]), toX, toY);
+      parent.append(svg('path', {class: 'band', d: text + 'Z', style: `fill: ${colour(band.role)}`}));
+    }
   }
   for (const line of panel.lines) {
     const path = pathOf(...part(line), toX, toY, isFinite(domain[0]) ? holeIn(line.x) : Infinity);
