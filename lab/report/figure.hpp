@@ -2,7 +2,7 @@
 //   lines  panels over time: {panels: [{label, unit, from_zero, lines: [{name, role, x, y}], bands: [{name, role, x, y}]}]}
 //   plane  curves with equal scales: {x_label, y_label, equal, lines}
 //   strip  what was on when: {rows: [{label, spans: [[begin, end, class, text]]}]}
-//   bars   a histogram: {x_label, log, edges, groups: [{name, role, counts}]}
+//   bars   a histogram: {x_label, log, edges, groups: [{name, role, counts}]}; counts or percents
 //   cloud  points to turn: {n, xyz, rgb | intensity, low, high, lines}
 //   table  {columns, rows}
 #pragma once

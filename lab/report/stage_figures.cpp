@@ -41,7 +41,7 @@ Json histogram(const std::map<std::string, Stage>& stages) {
     }
   }
   const double from = std::log10(low) - 0.01, step = (std::log10(std::max(high, low * 2)) + 0.01 - from) / static_cast<double>(bins);
-  Json out = figure("bars", "stage_histogram", "time", "How often a stage took how long", "");
+  Json out = figure("bars", "stage_histogram", "time", "How often a stage took how long", "In percent of each stage's own number.");
   out["x_label"] = "µs";
   out["log"] = true;
   out["edges"] = Json::array();
@@ -54,7 +54,9 @@ Json histogram(const std::map<std::string, Stage>& stages) {
       const double bin = (std::log10(std::max(us, least_us)) - from) / step;
       ++counts[static_cast<std::size_t>(std::clamp(bin, 0.0, static_cast<double>(bins - 1)))];
     }
-    out["groups"].push_back({{"name", name}, {"role", std::to_string(number++)}, {"counts", counts}});
+    Json shares = Json::array();
+    for (const std::size_t n : counts) shares.push_back(rounded(100.0 * static_cast<double>(n) / static_cast<double>(stage.us.size()), 3));
+    out["groups"].push_back({{"name", name}, {"role", std::to_string(number++)}, {"counts", std::move(shares)}});
   }
   return out;
 }
@@ -69,14 +71,14 @@ Figures stage_figures(const TimeBase& time, const std::vector<StageRow>& timing)
   }
   if (stages.empty()) return {};
   Json over_time = figure("lines", "stages", "time", "Stage times over the run", "Wall clock of each stage.");
-  Json lines = Json::array();
+  over_time["panels"] = Json::array();
   std::size_t number = 0;
   for (const auto& [name, stage] : stages) {
     const auto kept = thin(std::span(&stage.us, 1), buckets);
-    lines.push_back(line(name, std::to_string(number++), column(stage.t, kept, 3), column(stage.us, kept, 1)));
+    const Json curve = line(name, std::to_string(number++), column(stage.t, kept, 3), column(stage.us, kept, 1));
+    over_time["panels"].push_back(
+        {{"label", name}, {"unit", "µs"}, {"lines", Json::array({curve})}, {"bands", Json::array()}, {"from_zero", true}});
   }
-  over_time["panels"] =
-      Json::array({{{"label", "stage"}, {"unit", "µs"}, {"lines", std::move(lines)}, {"bands", Json::array()}, {"from_zero", true}}});
   return {over_time, histogram(stages), table(stages)};
 }
 

@@ -89,8 +89,9 @@ function drawBars(figure, parent) {
 
 /** Grid and labels at 1, 2 and 5 times the powers of ten. `toX` takes logarithms. */
 function drawLogAxis(parent, box, toX, label) {
+  const wide = (box.right - box.left) / (toX.invert(box.right) - toX.invert(box.left)) < 120;  // pixels for a power of ten
   for (let power = -1; power <= 7; ++power) {
-    for (const m of [1, 2, 5]) {
+    for (const m of wide ? [1] : [1, 2, 5]) {
       const x = toX(Math.log10(m * 10 ** power));
       if (x < box.left || x > box.right) continue;
       parent.append(svg('line', {class: 'grid', x1: x, x2: x, y1: box.top, y2: box.bottom}));
