@@ -1,6 +1,6 @@
 # One word per task; each does all its own set-up.
 #   make build      the program: build/release/bin/kilvo
-#   make demo       simulate a small room, run on it, evaluate
+#   make demo       simulate a small room, run on it, evaluate, show it
 #   make test       build and run every test
 #   make bench      time the functions; RECORDINGS=DIR: time and judge whole recordings as well
 #   make check      layout, walls, sizes, headers, clang-tidy (files that changed since they last passed; ALL=1: every file)

@@ -1,4 +1,4 @@
-// kilvo demo: simulate a walk through a room, run on it, compare with the truth, say where to look.
+// kilvo demo: simulate a walk through a room, run on it, compare with the truth, show it, say where to look.
 #include <fmt/core.h>
 #include <memory>
 
@@ -10,6 +10,7 @@
 #include "lab/evaluation/evaluate.hpp"
 #include "lab/evaluation/trajectory_file.hpp"
 #include "lab/recordings/recording_writer.hpp"
+#include "lab/report/report.hpp"
 #include "lab/simulation/analytic_room.hpp"
 
 namespace kilvo::cli {
@@ -66,6 +67,7 @@ void tell(const fs::path& folder, const fs::path& results, const lab::Evaluation
   fmt::print("  drift from start to end  {:.1f} mm\n", 1e3 * e.e2e_m);
   fmt::print("  {}\n", judged.diverged ? "This is NOT as it should be." : "As it should be.");
   fmt::print("Look at:\n");
+  fmt::print("  {}  pictures of all of it, for a browser\n", (results / "report.html").string());
   fmt::print("  {}  the map, for MeshLab or CloudCompare\n", (results / "map.ply").string());
   fmt::print("  {}  the trajectory, t x y z qx qy qz qw\n", (results / "odometry.tum").string());
   fmt::print("  {}  everything about the run\n", (results / "summary.json").string());
@@ -85,6 +87,7 @@ int demo(const DemoOptions& options) {
   const int code = run_recording(run);
   if (code != done) return code;
   const lab::Evaluation e = lab::evaluate(lab::read_tum(results / "sweeps.tum"), lab::read_tum(folder / "gt.tum"), lab::Alignment::se3);
+  write_text_file(results / "report.html", lab::make_report({results, folder / "gt.tum", {}}).html);
   tell(folder, results, e);
   return lab::judge_divergence(e).diverged ? run_failed : done;
 }

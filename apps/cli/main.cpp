@@ -7,9 +7,11 @@
 #include "apps/cli/verbs.hpp"
 #include "apps/cli/words.hpp"
 #include "lab/evaluation/align.hpp"
+#include "lab/evaluation/csv_reader.hpp"
 #include "lab/evaluation/trajectory_file.hpp"
 #include "lab/mapping/output_error.hpp"
 #include "lab/messages/input_error.hpp"
+#include "lab/report/report.hpp"
 #include "lab/settings/settings.hpp"
 
 namespace kilvo::cli {
@@ -31,6 +33,8 @@ int parse_and_do(const std::vector<std::string>& words) {
   add_run(program, chosen);
   add_info(program, chosen);
   add_eval(program, chosen);
+  add_eval_contacts(program, chosen);
+  add_report(program, chosen);
   add_config(program, chosen);
   add_demo(program, chosen);
   for (CLI::App* verb : program.get_subcommands({})) verb->group("Verbs");
@@ -77,6 +81,10 @@ int run_program(const std::vector<std::string>& words) {
   } catch (const lab::TrajectoryError& e) {
     return fail(unusable_input, e.what());
   } catch (const lab::EvaluationError& e) {
+    return fail(unusable_input, e.what());
+  } catch (const lab::CsvError& e) {
+    return fail(unusable_input, e.what());
+  } catch (const lab::ReportError& e) {
     return fail(unusable_input, e.what());
   } catch (const std::bad_alloc&) {
     return fail(run_failed, "out of memory");

@@ -13,6 +13,8 @@ using Action = std::function<int()>;
 void add_run(CLI::App& program, Action& chosen);
 void add_info(CLI::App& program, Action& chosen);
 void add_eval(CLI::App& program, Action& chosen);
+void add_eval_contacts(CLI::App& program, Action& chosen);
+void add_report(CLI::App& program, Action& chosen);
 void add_config(CLI::App& program, Action& chosen);
 void add_demo(CLI::App& program, Action& chosen);
 

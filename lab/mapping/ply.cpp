@@ -42,15 +42,24 @@ bool write_map(const fs::path& path, const MapBuilder& map) {
   return std::fclose(file.release()) == 0;
 }
 
-/// Where each of x, y, z, intensity begins in a vertex, and how long a vertex is.
+struct Property {
+  std::string_view name;
+  std::string_view type;
+};
+constexpr std::array<Property, 7> known_properties = {
+    {{"x", "float"}, {"y", "float"}, {"z", "float"}, {"intensity", "float"}, {"red", "uchar"}, {"green", "uchar"}, {"blue", "uchar"}}};
+
+/// Where each of the known properties begins in a vertex, and how long a vertex is.
 struct Layout {
   std::size_t points = 0;
   std::size_t stride = 0;
-  std::array<std::optional<std::size_t>, 4> offsets;
+  std::array<std::optional<std::size_t>, known_properties.size()> offsets;
+
+  bool has_intensity() const { return offsets[3].has_value(); }
+  bool has_rgb() const { return offsets[4] && offsets[5] && offsets[6]; }
 };
 
 Layout read_header(std::istream& in, const std::string& path) {
-  constexpr std::array<std::string_view, 4> names = {"x", "y", "z", "intensity"};
   const auto fail = [&](const std::string& why) { throw PlyError(path + ": " + why); };
   Layout layout;
   std::string line, word, type, name;
@@ -62,13 +71,26 @@ Layout read_header(std::istream& in, const std::string& path) {
     if (word == "comment") continue;
     if (word == "element" && layout.stride == 0 && words >> name >> layout.points && name == "vertex") continue;
     if (word != "property" || !(words >> type >> name) || (type != "float" && type != "uchar")) fail("cannot read '" + line + "'");
-    const auto known = std::find(names.begin(), names.end(), name);
-    if (known != names.end() && type == "float") layout.offsets[static_cast<std::size_t>(known - names.begin())] = layout.stride;
+    for (std::size_t i = 0; i < known_properties.size(); ++i)
+      if (known_properties[i].name == name && known_properties[i].type == type) layout.offsets[i] = layout.stride;
     layout.stride += type == "float" ? 4 : 1;
   }
   if (!in) fail("the header has no end");
   if (!layout.offsets[0] || !layout.offsets[1] || !layout.offsets[2]) fail("no float x, y, z");
   return layout;
+}
+
+/// Copies what is known of one vertex.
+void append_vertex(const std::vector<char>& vertex, const Layout& layout, Cloud& cloud) {
+  const auto copy = [&](std::size_t property, auto& value) {
+    std::memcpy(&value, vertex.data() + *layout.offsets[property], sizeof(value));
+  };
+  Eigen::Vector3f& p = cloud.points_W.emplace_back();
+  for (std::size_t i = 0; i < 3; ++i) copy(i, p[static_cast<Eigen::Index>(i)]);
+  if (layout.has_intensity()) copy(3, cloud.intensity.emplace_back());
+  if (!layout.has_rgb()) return;
+  auto& rgb = cloud.rgb.emplace_back();
+  for (std::size_t i = 0; i < 3; ++i) copy(4 + i, rgb[i]);
 }
 
 }  // namespace
@@ -88,19 +110,28 @@ void write_ply(const fs::path& path, const MapBuilder& map) {
   throw OutputError("cannot write " + path.string() + ": " + reason);
 }
 
-std::vector<Eigen::Vector4f> read_ply(const fs::path& path) {
+Cloud read_cloud(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) throw PlyError("cannot open " + path.string());
   const Layout layout = read_header(in, path.string());
-  std::vector<Eigen::Vector4f> points;
+  Cloud cloud;
   std::vector<char> vertex(layout.stride);
-  while (points.size() < layout.points && in.read(vertex.data(), static_cast<std::streamsize>(vertex.size()))) {
-    Eigen::Vector4f point = Eigen::Vector4f::Zero();
-    for (std::size_t i = 0; i < 4; ++i)
-      if (layout.offsets[i]) std::memcpy(point.data() + i, vertex.data() + *layout.offsets[i], sizeof(float));
-    points.push_back(point);
+  while (cloud.points_W.size() < layout.points && in.read(vertex.data(), static_cast<std::streamsize>(vertex.size()))) {
+    append_vertex(vertex, layout, cloud);
   }
-  if (points.size() < layout.points) throw PlyError(path.string() + ": ends after " + std::to_string(points.size()) + " points");
+  if (cloud.points_W.size() < layout.points)
+    throw PlyError(path.string() + ": ends after " + std::to_string(cloud.points_W.size()) + " points");
+  return cloud;
+}
+
+std::vector<Eigen::Vector4f> read_ply(const fs::path& path) {
+  const Cloud cloud = read_cloud(path);
+  std::vector<Eigen::Vector4f> points;
+  points.reserve(cloud.points_W.size());
+  for (std::size_t i = 0; i < cloud.points_W.size(); ++i) {
+    const Eigen::Vector3f& p = cloud.points_W[i];
+    points.emplace_back(p.x(), p.y(), p.z(), cloud.intensity.empty() ? 0.0F : cloud.intensity[i]);
+  }
   return points;
 }
 

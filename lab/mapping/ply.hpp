@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <stdexcept>
 #include <vector>
@@ -20,8 +22,18 @@ class PlyError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Reads x, y, z, intensity of a binary little-endian PLY with one element `vertex`; other float and uchar properties are skipped, a
-/// missing intensity is 0. Throws PlyError.
+/// The points of a file: world frame, m. `intensity` and `rgb` are as long as `points_W`, or empty when the file has none.
+struct Cloud {
+  std::vector<Eigen::Vector3f> points_W;
+  std::vector<float> intensity;
+  std::vector<std::array<std::uint8_t, 3>> rgb;
+};
+
+/// Reads float x, y, z, intensity and uchar red, green, blue of a binary little-endian PLY with one element `vertex`; other float and uchar
+/// properties are skipped. Throws PlyError.
+Cloud read_cloud(const std::filesystem::path& path);
+
+/// The same as x, y, z, intensity; a missing intensity is 0. Throws PlyError.
 std::vector<Eigen::Vector4f> read_ply(const std::filesystem::path& path);
 
 }  // namespace kilvo::lab

@@ -121,6 +121,22 @@ TEST_F(Ply, ReadsAFileWithColourAndAnotherOrder) {
   EXPECT_EQ(read_ply(folder / "other.ply"), (std::vector<Eigen::Vector4f>{{1, 2, 3, 0}}));
 }
 
+TEST_F(Ply, ACloudHasColourAndIntensityOnlyWhenItsFileHas) {
+  std::ofstream out(folder / "colour.ply", std::ios::binary);
+  out << "ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty uchar red\nproperty float x\nproperty float y\n"
+         "property float z\nproperty uchar green\nproperty uchar blue\nend_header\n";
+  const float xyz[] = {1, 2, 3};
+  for (const char* rgb : {"abc", "def"}) out.put(rgb[0]).write(reinterpret_cast<const char*>(xyz), 12).write(rgb + 1, 2);
+  out.close();
+  const Cloud cloud = read_cloud(folder / "colour.ply");
+  EXPECT_EQ(cloud.points_W, (std::vector<Eigen::Vector3f>{{1, 2, 3}, {1, 2, 3}}));
+  EXPECT_EQ(cloud.rgb, (std::vector<std::array<std::uint8_t, 3>>{{'a', 'b', 'c'}, {'d', 'e', 'f'}}));
+  EXPECT_TRUE(cloud.intensity.empty());
+  write_ply(folder / "map.ply", some_map());
+  EXPECT_TRUE(read_cloud(folder / "map.ply").rgb.empty());
+  EXPECT_EQ(read_cloud(folder / "map.ply").intensity.size(), some_map().size());
+}
+
 TEST_F(Ply, RefusesAFileThatIsNoneOrEndsEarly) {
   write_ply(folder / "map.ply", some_map());
   fs::resize_file(folder / "map.ply", 1000);

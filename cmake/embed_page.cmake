@@ -1,0 +1,25 @@
+# cmake -D "PARTS=page.html;page.css;a.js" -D OUTPUT=page.cpp -P embed_page.cmake
+#
+# Puts each part into the first one, where that says {{its name}}, and writes the whole as a function of C++ (lab/report/page.hpp).
+list(POP_FRONT PARTS first)
+file(READ "${first}" whole)
+foreach(part ${PARTS})
+  get_filename_component(name "${part}" NAME)
+  file(READ "${part}" text)
+  string(FIND "${whole}" "{{${name}}}" place)
+  if(place EQUAL -1)
+    message(FATAL_ERROR "${first} has no place {{${name}}}")
+  endif()
+  string(REPLACE "{{${name}}}" "${text}" whole "${whole}")
+endforeach()
+# A literal may have 64 KiB by the standard; pieces of 8 000 characters, joined by the compiler, are read by every one.
+set(code "// Made by cmake/embed_page.cmake.\n#include \"lab/report/page.hpp\"\n\nnamespace kilvo::lab {\n\nstd::string_view report_page() {\n  return\n")
+string(LENGTH "${whole}" length)
+set(begin 0)
+while(begin LESS length)
+  string(SUBSTRING "${whole}" ${begin} 8000 piece)
+  string(APPEND code "R\"kilvo_page(${piece})kilvo_page\"\n")
+  math(EXPR begin "${begin} + 8000")
+endwhile()
+string(APPEND code ";\n}\n\n}  // namespace kilvo::lab\n")
+file(WRITE "${OUTPUT}" "${code}")
