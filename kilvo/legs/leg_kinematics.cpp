@@ -1,13 +1,12 @@
 #include "kilvo/legs/leg_kinematics.hpp"
 
-#include <urdf_parser/urdf_parser.h>
-
 #include <algorithm>
 #include <cmath>
 #include <kdl/chainfksolvervel_recursive.hpp>
 #include <kdl/tree.hpp>
 #include <optional>
 #include <stdexcept>
+#include <urdf_parser/urdf_parser.h>
 
 namespace kilvo {
 namespace {
@@ -119,7 +118,7 @@ std::optional<std::string> LegKinematics::Chains::find_places(const std::vector<
 const std::vector<double>& LegKinematics::Chains::velocity_of(const JointSample& s) {
   if (s.velocity.size() == s.position.size()) return s.velocity;
   const double dt = to_seconds(s.t - last_t);
-  constexpr double longest = 0.1;  // s
+  constexpr double longest = 0.1;      // s
   constexpr double smoothing = 0.001;  // s, of the low pass over the differences
   velocity.resize(s.position.size(), 0.0);
   if (last_position.size() == s.position.size() && dt > 0 && dt < longest) {
@@ -136,7 +135,9 @@ const std::vector<double>& LegKinematics::Chains::velocity_of(const JointSample&
 FootPose LegKinematics::Chains::pose_of(std::size_t side, const JointSample& s, const std::vector<double>& velocity_of_all) {
   FootPose out;
   if (!by_joints) {
-    const auto triple = [side](const std::vector<double>& all) { return Eigen::Vector3d(all[3 * side], all[3 * side + 1], all[3 * side + 2]); };
+    const auto triple = [side](const std::vector<double>& all) {
+      return Eigen::Vector3d(all[3 * side], all[3 * side + 1], all[3 * side + 2]);
+    };
     out.corners = 1;
     const Eigen::Vector3d down(0, 0, -mount.sole_offset);
     out.p[0] = mount.T_imu_feet * (triple(s.position) + down);

@@ -18,10 +18,10 @@ inline constexpr int max_corners = 8;
 
 /// One foot relative to the IMU, in the IMU frame.
 struct FootPose {
-  SO3 R_IF;                                       // h_R(alpha) of Eq. 2
-  int corners = 0;                                // points of the sole in use
-  std::array<Eigen::Vector3d, max_corners> p{};   // the sole's corner points, m
-  std::array<Eigen::Vector3d, max_corners> v{};   // their velocities relative to the IMU, m/s
+  SO3 R_IF;                                      // h_R(alpha) of Eq. 2
+  int corners = 0;                               // points of the sole in use
+  std::array<Eigen::Vector3d, max_corners> p{};  // the sole's corner points, m
+  std::array<Eigen::Vector3d, max_corners> v{};  // their velocities relative to the IMU, m/s
 };
 
 struct Feet {
