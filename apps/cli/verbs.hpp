@@ -15,5 +15,6 @@ void add_info(CLI::App& program, Action& chosen);
 void add_eval(CLI::App& program, Action& chosen);
 void add_config(CLI::App& program, Action& chosen);
 void add_demo(CLI::App& program, Action& chosen);
+void add_simulate(CLI::App& program, Action& chosen);
 
 }  // namespace kilvo::cli
