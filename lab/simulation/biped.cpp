@@ -69,7 +69,7 @@ std::array<Eigen::Vector3d, 4> BipedShape::sole() const {
 
 const std::array<JointLimit, leg_joint_count>& leg_limits() {
   static constexpr std::array<JointLimit, leg_joint_count> limits{
-      {{-2.53, 2.53}, {-0.52, 1.6}, {-2.75, 2.75}, {0.02, 2.88}, {-1.1, 0.9}, {-0.35, 0.35}}};
+      {{-2.53, 2.53}, {-0.52, 1.6}, {-2.75, 2.75}, {0.02, 2.88}, {-1.2, 0.9}, {-0.35, 0.35}}};
   return limits;
 }
 

@@ -49,7 +49,20 @@ Gait running() {
           .impact = 16};
 }
 Gait climbing() {
-  return {.period = 0.7, .double_support = 0.16, .lift = 0.06, .hip_height = 0.49, .sway = 0.03, .bob = 0.006, .lean = 0.06, .impact = 5};
+  return {.period = 0.7,
+          .double_support = 0.16,
+          .lift = 0.045,
+          .hip_height = 0.515,
+          .sway = 0.03,
+          .bob = 0.006,
+          .lean = 0.06,
+          .impact = 5,
+          .toe_off = 0.35};
+}
+Gait descending() {
+  Gait gait = climbing();
+  gait.hip_height = 0.49;
+  return gait;
 }
 Gait rolling() { return {.hip_height = 0.54, .heel_strike = 0.18, .toe_off = 0.3}; }
 Gait slipping() { return {.slip = 0.03}; }
@@ -122,8 +135,8 @@ std::vector<Scenario> of_elsewhere() {
       {"stairs",
        "six stairs up, a turn, and down again",
        "stairs",
-       {0.05, 0, 0},
-       {still, ahead(3, 0.28, climbing()), ahead(11, 0.28, climbing()), turn(14, 2 * quarter, 0, climbing()), ahead(14, 0.28, climbing()),
+       {-0.02, 0, 0},
+       {still, ahead(3, 0.28, climbing()), ahead(11, 0.28, climbing()), turn(14, 2 * quarter, 0, climbing()), ahead(14, 0.28, descending()),
         rest}},
   };
   return out;

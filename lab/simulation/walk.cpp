@@ -37,8 +37,9 @@ SE3 pivot(double x, double z, double angle) {
 // From where the foot left to where it comes down; u from 0 to 1. Up first, then across; down last.
 SE3 swing(const SE3& from, const SE3& to, double lift, double u) {
   const double rise = to.p.z() - from.p.z();
-  const double across = smooth_step((u - 0.06) / 0.88);
-  const double up = rise > 0.02 ? smooth_step(u / 0.6) : rise < -0.02 ? smooth_step((u - 0.4) / 0.6) : smooth_step(u);
+  constexpr double step_edge = 0.02;  // m
+  const double across = smooth_step((u - (rise > step_edge ? 0.16 : 0.05)) / (std::abs(rise) > step_edge ? 0.79 : 0.9));
+  const double up = rise > step_edge ? smooth_step(u / 0.5) : rise < -step_edge ? smooth_step((u - 0.5) / 0.5) : smooth_step(u);
   SE3 out{from.R * SO3::Exp(across * (from.R.inverse() * to.R).Log()), from.p + across * (to.p - from.p)};
   out.p.z() = from.p.z() + up * rise + lift * smooth_bump(u);
   return out;

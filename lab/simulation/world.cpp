@@ -10,7 +10,7 @@
 namespace kilvo::lab {
 
 struct World::Rays {
-  explicit Rays(const std::vector<Surface>& surfaces) : device(rtcNewDevice("threads=1")), scene(rtcNewScene(device)) {
+  explicit Rays(const std::vector<Surface>& surfaces) : device(rtcNewDevice(nullptr)), scene(rtcNewScene(device)) {
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
