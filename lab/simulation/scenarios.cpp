@@ -46,7 +46,7 @@ Gait running() {
           .pitch = 0.01,
           .twist = 0.1,
           .lean = 0.1,
-          .impact = 16};
+          .impact = 12};
 }
 Gait climbing() {
   return {.period = 0.7,

@@ -14,15 +14,16 @@ namespace channel {
 enum : std::uint8_t { x, y, z, yaw, phase, sway, bob, roll, pitch, twist, lean };
 }
 
-// An impact rings at this frequency and dies away at this rate; it begins within milliseconds, so that 200 samples a second see it.
-constexpr double ring_frequency = 2 * pi * 28, ring_decay = 25, ring_rise = 0.006;
+// An impact rings at this frequency and dies away at this rate. It sets in like an error function, `onset` wide: that leaves next to
+// nothing above 100 Hz, so that 200 samples a second are enough to integrate it.
+constexpr double ring_frequency = 2 * pi * 28, ring_decay = 25, ring_onset = 0.004, ring_delay = 0.021;
 constexpr double ring_length = 1.2;  // s; less than a picometre is left then
 
 // Displacement per unit of acceleration, m per m/s^2.
 double ring(double t) {
   if (t <= 0 || t > ring_length) return 0;
-  const double rise = 1 - std::exp(-t / ring_rise), r2 = rise * rise;
-  return r2 * r2 * std::exp(-ring_decay * t) * std::sin(ring_frequency * t) / (ring_frequency * ring_frequency);
+  const double since = t - ring_delay, grown = std::erfc(-since / (ring_onset * std::numbers::sqrt2)) / 2;
+  return grown * std::exp(-ring_decay * since) * std::sin(ring_frequency * since) / (ring_frequency * ring_frequency);
 }
 
 constexpr std::size_t index_of(Side side) { return side == Side::left ? 0 : 1; }
@@ -91,7 +92,7 @@ Eigen::Vector2d Walk::ringing(double t) const {
     --it;
     sum += it->strength * ring(t - it->t);
   }
-  constexpr double pitch_per_metre = 1.5;
+  constexpr double pitch_per_metre = 1.0;
   return {sum, pitch_per_metre * sum};
 }
 
