@@ -163,8 +163,7 @@ TEST(Walk, WhatTheLegsCannotDoIsAnErrorThatSaysWhenAndWhy) {
   EXPECT_THAT(fault({{.steps = 2, .gait = {.period = 0.01}}}), HasSubstr("cannot be walked"));
   Ground sill;  // a sill between two footprints
   sill.add({0.4, 0.45, 0.05, 0.3, 0.1, 0.1});
-  EXPECT_THAT(fault({{.stand = 3, .steps = 6, .gait = {.forward = 0.2, .lift = 0.05}}}, sill),
-              HasSubstr("would hit the ground"));
+  EXPECT_THAT(fault({{.stand = 3, .steps = 6, .gait = {.forward = 0.2, .lift = 0.05}}}, sill), HasSubstr("would hit the ground"));
 }
 
 TEST(Biped, InverseKinematicsIsTheInverseOfTheKinematics) {

@@ -125,16 +125,27 @@ std::optional<Hit> World::cast(const Eigen::Vector3d& origin, const Eigen::Vecto
   hit.range = n.dot(s.corner - origin) / along;
   hit.cosine = std::abs(along);
   const Eigen::Vector3d x = origin + hit.range * direction - s.corner;
-  hit.u = x.dot(s.u) / s.u.norm();
-  hit.v = x.dot(s.v) / s.v.norm();
+  const Eigen::Vector3d u = s.u.normalized(), v = s.v.normalized();
+  hit.u = x.dot(u);
+  hit.v = x.dot(v);
+  const Eigen::Vector2d heading(direction.dot(u), direction.dot(v));
+  hit.heading = heading / std::max(heading.norm(), 1e-12);
   return hit;
 }
 
 Colour World::radiance(const Hit& hit, double pixel) const {
   const Material& material = scene_.materials[scene_.surfaces[hit.surface].material];
   const Eigen::Vector2d& offset = offsets_[hit.surface];
-  const double footprint = hit.range * pixel / std::max(hit.cosine, 0.05);
-  const double tone = textures_[static_cast<std::size_t>(material.pattern)].at(hit.u + offset.x(), hit.v + offset.y(), footprint);
+  constexpr double lens = 1.5;  // pixels; a lens blurs so much
+  // A pixel sees an ellipse, long where the surface is grazed: several round looks along it.
+  const double across = lens * hit.range * pixel, along = across / std::max(hit.cosine, 0.05);
+  const int looks = std::clamp(static_cast<int>(std::lround(1.2 * along / across)), 1, 8);
+  const double footprint = std::max(across, along / looks);
+  double tone = 0;
+  for (int k = 0; k < looks; ++k) {
+    const Eigen::Vector2d at = Eigen::Vector2d(hit.u, hit.v) + offset + along * ((k + 0.5) / looks - 0.5) * hit.heading;
+    tone += textures_[static_cast<std::size_t>(material.pattern)].at(at.x(), at.y(), footprint) / looks;
+  }
   return shade_[hit.surface] * (material.dark + static_cast<float>(tone) * (material.bright - material.dark));
 }
 

@@ -45,10 +45,11 @@ struct Scene {
 };
 
 struct Hit {
-  double range = 0;         // m
-  std::size_t surface = 0;  // index into World::surfaces()
-  double u = 0, v = 0;      // m along the surface's edges
-  double cosine = 1;        // of the angle of incidence
+  double range = 0;                                    // m
+  std::size_t surface = 0;                             // index into World::surfaces()
+  double u = 0, v = 0;                                 // m along the surface's edges
+  double cosine = 1;                                   // of the angle of incidence
+  Eigen::Vector2d heading = Eigen::Vector2d::UnitX();  // of the ray along the surface, unit, in the directions of u and v
 };
 
 class World {
