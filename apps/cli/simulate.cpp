@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 struct SimulateOptions {
   std::string scenario, out;
-  std::uint64_t seed = 1;
+  std::int64_t seed = 1;
   std::optional<double> duration;
   bool quiet = false;
 };
@@ -97,8 +97,9 @@ int simulate(const SimulateOptions& options) {
   if (options.duration && !(*options.duration > 0 && *options.duration <= longest)) {
     throw UsageError(fmt::format("--duration must be above 0 and at most {} seconds", longest));
   }
+  if (options.seed < 0) throw UsageError("--seed must be 0 or more");
   lab::SimulatorConfig config;
-  config.seed = options.seed;
+  config.seed = static_cast<std::uint64_t>(options.seed);
   config.duration = options.duration.value_or(0);
   config.threads = 0;
   const fs::path folder = options.out;
