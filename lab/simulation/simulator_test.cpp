@@ -210,6 +210,31 @@ TEST(Lidar, TheOwnBodyIsNotSeenAndFarAndGrazedSurfacesAreNot) {
   for (const LidarPoint& p : std::get<LidarScan>(near_scans.front()).points) ASSERT_LT(Eigen::Vector3f(p.x, p.y, p.z).norm(), 2.15F);
 }
 
+TEST(Lidar, TheMiddleOfTheCorridorSaysNothingAboutTheWayAlongIt) {
+  const Scenario& corridor = scenario("corridor");
+  const World world(make_scene("corridor", 1), 1);
+  SimulatorConfig config;
+  config.lidar.points = 2000;
+  const LidarSensor lidar(config, world, corridor.lidar_range);
+  const auto along = [&](double x) {
+    const SE3 T_WT{SO3(), {x, 0, 0.8}};
+    double sum = 0, n = 0;
+    for (const LidarPoint& p : lidar
+                                   .scan(
+                                       0, 0, [&](double) { return T_WT; }, Workers())
+                                   .points) {
+      const Eigen::Vector3d direction = config.shape.T_torso_lidar.R * Eigen::Vector3d(p.x, p.y, p.z).normalized();
+      const auto hit = world.cast(T_WT * config.shape.T_torso_lidar.p, direction);
+      if (hit) sum += std::pow(world.surfaces()[hit->surface].normal().x(), 2), ++n;
+    }
+    EXPECT_GT(n, 1000);
+    return sum / n;
+  };
+  EXPECT_GT(along(0), 0.03);
+  EXPECT_GT(along(33), 0.03);
+  EXPECT_EQ(along(18), 0);
+}
+
 TEST(Camera, ProjectionAndItsInverseAgree) {
   const CameraModel model;
   for (const Eigen::Vector2d& pixel :

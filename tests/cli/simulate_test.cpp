@@ -15,68 +15,64 @@ std::size_t lines_in(const std::string& path) {
   return static_cast<std::size_t>(std::ranges::count(text, '\n'));
 }
 
-/// One simulation for all: 5 s of the room, the last of them walking.
-class Simulated : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    folder() = std::make_unique<TemporaryFolder>();
-    finished() = kilvo({"simulate", "room", "--out", *folder() / "sim", "--seed", "3", "--duration", "5"});
-  }
-  static void TearDownTestSuite() { folder().reset(); }
+/// A simulation in a folder of its own.
+struct Simulated {
+  TemporaryFolder folder;
 
-  static std::unique_ptr<TemporaryFolder>& folder() {
-    static std::unique_ptr<TemporaryFolder> one;
-    return one;
+  std::string file(const std::string& name) const { return folder / ("sim/" + name); }
+
+  void expect_files() const {
+    EXPECT_EQ(lines_in(file("gt.tum")), 5001U);
+    EXPECT_EQ(lines_in(file("contacts.gt.csv")), 5002U);
+    EXPECT_EQ(lines_in(file("imu_truth.csv")), 1002U);
+    EXPECT_EQ(lines_in(file("exposure.csv")), 52U);
+    EXPECT_THAT(read_text(file("contacts.gt.csv")), AllOf(HasSubstr("t,left,right\n1700000000.000000000,1,1\n"), HasSubstr(",0,1\n")));
   }
-  static Finished& finished() {
-    static Finished one;
-    return one;
+
+  void expect_the_shipped_robot() const {
+    const std::string robots = std::string(KILVO_SOURCE_DIR) + "/config/robots/";
+    EXPECT_EQ(read_text(file("robot.urdf")), read_text(robots + "sim.urdf"));
+    std::string config = read_text(file("config.yaml"));
+    config.replace(config.find("robot.urdf"), 10, "sim.urdf");
+    EXPECT_EQ(config, read_text(robots + "sim.yaml"));
+    EXPECT_EQ(kilvo({"config", "check", file("config.yaml")}).code, 0);
   }
-  static std::string file(const std::string& name) { return *folder() / ("sim/" + name); }
+
+  void expect_that_ros_reads_it() const {
+    const std::string script =
+        "import rosbag, sys\n"
+        "info = rosbag.Bag(sys.argv[1]).get_type_and_topic_info()[1]\n"
+        "print(' '.join(f'{k}={v.msg_type}={v.message_count}' for k, v in sorted(info.items())))\n"
+        "for topic, m, t in rosbag.Bag(sys.argv[1]).read_messages(topics=['/joint_states']):\n"
+        "    assert len(m.name) == len(m.position) == 13, m\n"
+        "    break\n";
+    const Finished f = run_program("/usr/bin/python3", {"-c", script, file("recording.bag")});
+    ASSERT_EQ(f.code, 0) << f.err;
+    EXPECT_EQ(f.out,
+              "/camera/image_raw=sensor_msgs/Image=51 /imu=sensor_msgs/Imu=1001 /joint_states=sensor_msgs/JointState=5001 "
+              "/points=sensor_msgs/PointCloud2=50\n");
+  }
+
+  void expect_that_kilvo_runs_on_it() const {
+    const std::string out = folder / "li";
+    const Finished f = kilvo({"run", folder / "sim", "--sensors", "imu,lidar", "--out", out});
+    ASSERT_EQ(f.code, 0) << f.err;
+    EXPECT_THAT(f.err, HasSubstr("sim/config.yaml"));
+    const auto errors = lab::evaluate(lab::read_tum(out + "/sweeps.tum"), lab::read_tum(file("gt.tum")), lab::Alignment::se3);
+    EXPECT_LT(errors.ate_rmse_m, 0.01);
+    EXPECT_GT(errors.path_length_m, 0.3);
+  }
 };
 
-TEST_F(Simulated, WritesTheRecordingAndTheTruth) {
-  ASSERT_EQ(finished().code, 0) << finished().err;
-  EXPECT_THAT(finished().out, HasSubstr("5.0 s of 'room', seed 3"));
-  EXPECT_EQ(lines_in(file("gt.tum")), 5001U);
-  EXPECT_EQ(lines_in(file("contacts.gt.csv")), 5002U);
-  EXPECT_EQ(lines_in(file("imu_truth.csv")), 1002U);
-  EXPECT_EQ(lines_in(file("exposure.csv")), 52U);
-  EXPECT_THAT(read_text(file("contacts.gt.csv")), AllOf(HasSubstr("t,left,right\n1700000000.000000000,1,1\n"), HasSubstr(",0,1\n")));
-}
-
-TEST_F(Simulated, ShipsTheRobotThatTheProjectShips) {
-  const std::string robots = std::string(KILVO_SOURCE_DIR) + "/config/robots/";
-  EXPECT_EQ(read_text(file("robot.urdf")), read_text(robots + "sim.urdf"));
-  std::string config = read_text(file("config.yaml"));
-  config.replace(config.find("robot.urdf"), 10, "sim.urdf");
-  EXPECT_EQ(config, read_text(robots + "sim.yaml"));
-  EXPECT_EQ(kilvo({"config", "check", file("config.yaml")}).code, 0);
-}
-
-TEST_F(Simulated, AnotherRosToolReadsTheRecording) {
-  const std::string script =
-      "import rosbag, sys\n"
-      "info = rosbag.Bag(sys.argv[1]).get_type_and_topic_info()[1]\n"
-      "print(' '.join(f'{k}={v.msg_type}={v.message_count}' for k, v in sorted(info.items())))\n"
-      "for topic, m, t in rosbag.Bag(sys.argv[1]).read_messages(topics=['/joint_states']):\n"
-      "    assert len(m.name) == len(m.position) == 13, m\n"
-      "    break\n";
-  const Finished f = run_program("/usr/bin/python3", {"-c", script, file("recording.bag")});
+TEST(Simulate, AWalkIsWrittenReadByOthersAndRunOn) {
+  const Simulated walk;
+  const Finished f = kilvo({"simulate", "room", "--out", walk.folder / "sim", "--seed", "3", "--duration", "5"});
   ASSERT_EQ(f.code, 0) << f.err;
-  EXPECT_EQ(f.out,
-            "/camera/image_raw=sensor_msgs/Image=51 /imu=sensor_msgs/Imu=1001 /joint_states=sensor_msgs/JointState=5001 "
-            "/points=sensor_msgs/PointCloud2=50\n");
-}
-
-TEST_F(Simulated, KilvoRunsOnTheFolderWithItsOwnConfiguration) {
-  const std::string out = *folder() / "li";
-  const Finished f = kilvo({"run", *folder() / "sim", "--sensors", "imu,lidar", "--out", out});
-  ASSERT_EQ(f.code, 0) << f.err;
-  EXPECT_THAT(f.err, HasSubstr("sim/config.yaml"));
-  const auto errors = lab::evaluate(lab::read_tum(out + "/sweeps.tum"), lab::read_tum(file("gt.tum")), lab::Alignment::se3);
-  EXPECT_LT(errors.ate_rmse_m, 0.01);
-  EXPECT_GT(errors.path_length_m, 0.3);
+  EXPECT_THAT(f.out, HasSubstr("5.0 s of 'room', seed 3"));
+  walk.expect_files();
+  walk.expect_the_shipped_robot();
+  walk.expect_that_ros_reads_it();
+  walk.expect_that_kilvo_runs_on_it();
 }
 
 TEST(Simulate, WhatCannotBeDoneIsSaid) {
