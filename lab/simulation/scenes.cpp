@@ -70,7 +70,7 @@ void furnish(Scene& scene, const Palette& p, Random& random) {
   scene.add_box({5.2, -3.0 + a, 0}, {5.9, -1.4 + a, 1.2}, p.wood);
   scene.add_box({-2.4 + b, -3.9, 0}, {-1.2 + b, -3.3, 0.75}, p.cloth);
   scene.add_box({1.5 + b, -3.9, 0}, {2.1 + b, -3.5, 2.1}, p.wood);
-  scene.add_pole(4.6 + a, 1.0 + b, 0.12, 2.8, p.metal);
+  scene.add_pole(5.0 + a, 2.3 + b, 0.12, 2.8, p.metal);
   scene.add_box({-3.6, 3.3, 0}, {-3.1, 3.8, 0.5}, p.poster);
   for (int i = 0; i < 5; ++i) {  // pictures, a centimetre before the walls
     const double x = -4.2 + 2.1 * i + j(), z = 1.2 + random.uniform(0, 0.3), w = random.uniform(0.5, 1.1);
@@ -114,7 +114,8 @@ void make_yard(Scene& scene, Random& random) {
   for (int i = 0; i < 14; ++i) {
     const double angle = 0.45 * i + random.uniform(0, 0.2), r = random.uniform(5, 14);
     const double x = 3 + r * std::cos(angle), y = r * std::sin(angle);
-    if (std::abs(y) < 2.5) continue;
+    const bool on_the_running_track = x < 5 && std::abs(y + 4.5) < 1.2;
+    if (std::abs(y) < 2.5 || on_the_running_track) continue;
     const double height = random.uniform(2.5, 5);
     scene.add_pole(x, y, random.uniform(0.08, 0.2), height, i % 2 == 0 ? p.wood : p.metal);
     if (i % 2 == 0) scene.add_box({x - 0.8, y - 0.8, height}, {x + 0.8, y + 0.8, height + 1.2}, p.grass);
