@@ -15,6 +15,12 @@ constexpr double side = size * texel;
 
 using Grid = std::vector<float>;
 
+// std::floor for what fits an int64; on plain x86-64 that is a call into the library, and every pixel asks many times.
+double whole(double x) {
+  const auto i = static_cast<double>(static_cast<std::int64_t>(x));
+  return i > x ? i - 1 : i;
+}
+
 // Smooth noise that repeats with the texture: random values every `cell` texels, interpolated.
 void add_noise(Grid& grid, int cell, float amplitude, Random random) {
   const int n = size / cell;
@@ -108,7 +114,7 @@ Texture::Texture(Pattern pattern, std::uint64_t seed) {
 }
 
 double Texture::bilinear(std::size_t level, double x, double y) const {
-  const double n = static_cast<double>(size >> level), px = x * n - 0.5, py = y * n - 0.5, fx = std::floor(px), fy = std::floor(py);
+  const double n = static_cast<double>(size >> level), px = x * n - 0.5, py = y * n - 0.5, fx = whole(px), fy = whole(py);
   const auto mask = static_cast<std::size_t>((size >> level) - 1);
   const auto i = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(fx)) & mask,
              j = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(fy)) & mask;
@@ -118,9 +124,12 @@ double Texture::bilinear(std::size_t level, double x, double y) const {
   return ((1 - wy) * ((1 - wx) * data[j0 + i] + wx * data[j0 + i1]) + wy * ((1 - wx) * data[j1 + i] + wx * data[j1 + i1])) / 255;
 }
 
-double Texture::at(double u, double v, double footprint) const {
-  const double x = u / side - std::floor(u / side), y = v / side - std::floor(v / side);
-  const double level = std::clamp(std::log2(std::max(footprint, 1e-6) / texel), 0.0, static_cast<double>(levels_.size() - 1));
+double Texture::level_for(double footprint) {
+  return std::clamp(std::log2(std::max(footprint, 1e-6) / texel), 0.0, std::log2(static_cast<double>(size)));
+}
+
+double Texture::at(double u, double v, double level) const {
+  const double x = u / side - whole(u / side), y = v / side - whole(v / side);
   const auto below = std::min(static_cast<std::size_t>(level), levels_.size() - 2);
   const double f = level - static_cast<double>(below), fine = bilinear(below, x, y);
   return f > 0 ? fine + f * (bilinear(below + 1, x, y) - fine) : fine;

@@ -13,8 +13,11 @@ class Texture {
  public:
   Texture(Pattern pattern, std::uint64_t seed);
 
-  /// Between 0 and 1 at (u, v), in metres on the surface; repeats every 4.1 m. `footprint`: how much of the surface one pixel sees, m.
-  double at(double u, double v, double footprint) const;
+  /// Which copy is the right one for a pixel that sees `footprint` metres of the surface; between two of them: some of both.
+  static double level_for(double footprint);
+
+  /// Between 0 and 1 at (u, v), in metres on the surface; repeats every 4.1 m.
+  double at(double u, double v, double level) const;
 
  private:
   double bilinear(std::size_t level, double x, double y) const;

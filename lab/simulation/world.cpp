@@ -86,9 +86,9 @@ World::World(Scene scene, std::uint64_t seed) : scene_(std::move(scene)), rays_(
   const Eigen::Vector3d light = Eigen::Vector3d(0.35, 0.55, 0.76).normalized();
   Random random(seed, 77);
   for (const Surface& s : scene_.surfaces) {
-    shade_.push_back(static_cast<float>(0.72 + 0.28 * std::abs(s.normal().dot(light))));
+    const auto shade = static_cast<float>(0.72 + 0.28 * std::abs(s.normal().dot(light)));
     const double u = random.uniform(0, 4), v = random.uniform(0, 4);
-    offsets_.emplace_back(u, v);
+    faces_.push_back({s.corner, s.normal(), s.u.normalized(), s.v.normalized(), {u, v}, shade});
   }
 }
 
@@ -118,35 +118,34 @@ std::optional<Hit> World::cast(const Eigen::Vector3d& origin, const Eigen::Vecto
   // Which surface is Embree's to say; where on it, to the last bit, is not left to single precision.
   Hit hit;
   hit.surface = query.hit.primID / 2;
-  const Surface& s = scene_.surfaces[hit.surface];
-  const Eigen::Vector3d n = s.normal();
-  const double along = n.dot(direction);
+  const Face& face = faces_[hit.surface];
+  const double along = face.normal.dot(direction);
   if (std::abs(along) < 1e-9) return std::nullopt;
-  hit.range = n.dot(s.corner - origin) / along;
+  hit.range = face.normal.dot(face.corner - origin) / along;
   hit.cosine = std::abs(along);
-  const Eigen::Vector3d x = origin + hit.range * direction - s.corner;
-  const Eigen::Vector3d u = s.u.normalized(), v = s.v.normalized();
-  hit.u = x.dot(u);
-  hit.v = x.dot(v);
-  const Eigen::Vector2d heading(direction.dot(u), direction.dot(v));
-  hit.heading = heading / std::max(heading.norm(), 1e-12);
+  const Eigen::Vector3d x = origin + hit.range * direction - face.corner;
+  hit.u = x.dot(face.u);
+  hit.v = x.dot(face.v);
+  hit.heading = {direction.dot(face.u), direction.dot(face.v)};
   return hit;
 }
 
 Colour World::radiance(const Hit& hit, double pixel) const {
   const Material& material = scene_.materials[scene_.surfaces[hit.surface].material];
-  const Eigen::Vector2d& offset = offsets_[hit.surface];
+  const Face& face = faces_[hit.surface];
   constexpr double lens = 1.5;  // pixels; a lens blurs so much
   // A pixel sees an ellipse, long where the surface is grazed: several round looks along it.
   const double across = lens * hit.range * pixel, along = across / std::max(hit.cosine, 0.05);
-  const int looks = std::clamp(static_cast<int>(std::lround(1.2 * along / across)), 1, 8);
-  const double footprint = std::max(across, along / looks);
+  const int looks = std::clamp(static_cast<int>(1.2 * along / across + 0.5), 1, 8);
+  const double level = Texture::level_for(std::max(across, along / looks));
+  const Eigen::Vector2d middle = Eigen::Vector2d(hit.u, hit.v) + face.offset, heading = hit.heading.normalized();
+  const Texture& texture = textures_[static_cast<std::size_t>(material.pattern)];
   double tone = 0;
   for (int k = 0; k < looks; ++k) {
-    const Eigen::Vector2d at = Eigen::Vector2d(hit.u, hit.v) + offset + along * ((k + 0.5) / looks - 0.5) * hit.heading;
-    tone += textures_[static_cast<std::size_t>(material.pattern)].at(at.x(), at.y(), footprint) / looks;
+    const Eigen::Vector2d at = middle + along * ((k + 0.5) / looks - 0.5) * heading;
+    tone += texture.at(at.x(), at.y(), level) / looks;
   }
-  return shade_[hit.surface] * (material.dark + static_cast<float>(tone) * (material.bright - material.dark));
+  return face.shade * (material.dark + static_cast<float>(tone) * (material.bright - material.dark));
 }
 
 double World::reflectivity(const Hit& hit) const { return scene_.materials[scene_.surfaces[hit.surface].material].reflectivity; }

@@ -45,11 +45,11 @@ struct Scene {
 };
 
 struct Hit {
-  double range = 0;                                    // m
-  std::size_t surface = 0;                             // index into World::surfaces()
-  double u = 0, v = 0;                                 // m along the surface's edges
-  double cosine = 1;                                   // of the angle of incidence
-  Eigen::Vector2d heading = Eigen::Vector2d::UnitX();  // of the ray along the surface, unit, in the directions of u and v
+  double range = 0;                                   // m
+  std::size_t surface = 0;                            // index into World::surfaces()
+  double u = 0, v = 0;                                // m along the surface's edges
+  double cosine = 1;                                  // of the angle of incidence
+  Eigen::Vector2d heading = Eigen::Vector2d::Zero();  // of the ray along the surface, in the directions of u and v
 };
 
 class World {
@@ -71,10 +71,15 @@ class World {
 
  private:
   struct Rays;  // Embree's
+  /// A surface made ready: unit vectors, where in the texture its corner lies, how the light falls on it.
+  struct Face {
+    Eigen::Vector3d corner, normal, u, v;
+    Eigen::Vector2d offset;
+    float shade;
+  };
   Scene scene_;
-  std::vector<Texture> textures_;         // by Pattern
-  std::vector<float> shade_;              // by surface
-  std::vector<Eigen::Vector2d> offsets_;  // by surface: where in the texture its corner lies
+  std::vector<Texture> textures_;  // by Pattern
+  std::vector<Face> faces_;        // by surface
   std::unique_ptr<Rays> rays_;
 };
 
