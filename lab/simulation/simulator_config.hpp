@@ -51,7 +51,7 @@ struct CameraModel {
   std::array<double, 4> distortion{-0.05, 0.02, 0.0004, -0.0003};  // k1 k2 p1 p2
   SE3 T_torso_camera = mount();
   double exposure = 0.004;                      // s
-  double gain = 300;                            // grey level of full reflectance = 255 * exposure * gain
+  double gain = 230;                            // grey level of full reflectance = 255 * exposure * gain
   double exposure_swing = 0.25;                 // the exposure changes by up to this part of itself
   double exposure_period = 7;                   // s
   double read_noise = 1, photon_noise = 0.015;  // variance of a grey level I: read_noise^2 + photon_noise * I
