@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "lab/simulation/joint_effort.hpp"
+
 namespace kilvo::lab {
 namespace {
 
@@ -112,7 +114,7 @@ ImuSample Simulator::imu_at(double t) {
 JointSample Simulator::joints_at(double t) {
   const JointModel& m = config_.joints;
   Random& random = random_[index_of(Sensor::legs)];
-  const JointAngles angles = walk_.joints(t), rates = walk_.joint_velocities(t);
+  const JointAngles angles = walk_.joints(t), rates = walk_.joint_velocities(t), efforts = joint_efforts(walk_, t, m.mass);
   JointSample out;
   out.t = stamp(Sensor::legs, t);
   for (std::size_t i = 0; i < angles.size(); ++i) {
@@ -120,6 +122,7 @@ JointSample Simulator::joints_at(double t) {
     const double noisy = angles[i] + joint_offsets_[i] + m.position_noise * random.gaussian();
     out.position.push_back(m.resolution > 0 ? std::round(noisy / m.resolution) * m.resolution : noisy);
     out.velocity.push_back(rates[i] + m.velocity_noise * random.gaussian());
+    out.effort.push_back(efforts[i] + m.effort_noise * random.gaussian());
   }
   return out;
 }

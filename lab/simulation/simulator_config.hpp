@@ -31,6 +31,8 @@ struct JointModel {
   double position_noise = 1.5e-4;  // rad, sigma
   double velocity_noise = 0.02;    // rad/s, sigma
   double offset_sigma = 5e-4;      // rad, of each joint's zero, constant
+  double mass = 35;                // kg, of the robot: what the efforts carry
+  double effort_noise = 0.5;       // N m, sigma
 };
 
 struct LidarModel {

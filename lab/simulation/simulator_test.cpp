@@ -191,6 +191,24 @@ TEST(Lidar, TheRosetteDoesNotRepeatAndTheLinesDo) {
   EXPECT_LT(nearest(4711, 0.1), 1e-9);
 }
 
+TEST(Lidar, ASpinningOneGivesItsLines) {
+  SimulatorConfig config = only({Sensor::lidar}, 0.1);
+  config.lidar.scan = LidarModel::Scan::lines_64;
+  Simulator simulator(scenario("room"), config);
+  const auto scans = all_of(simulator);
+  ASSERT_EQ(scans.size(), 1U);
+  std::map<int, int> lines;  // by elevation in steps of a line
+  int late = -1;
+  for (const LidarPoint& p : std::get<LidarScan>(scans[0]).points) {
+    const double elevation = std::atan2(p.z, std::hypot(p.x, p.y)) * 180 / 3.14159265;
+    ++lines[static_cast<int>(std::lround((elevation + 22.5) / 45 * 63))];
+    EXPECT_GT(p.offset_ns, late);
+    late = p.offset_ns;
+  }
+  EXPECT_GE(lines.size(), 60U);
+  EXPECT_LE(lines.size(), 66U);
+}
+
 TEST(Lidar, TheOwnBodyIsNotSeenAndFarAndGrazedSurfacesAreNot) {
   SimulatorConfig config = only({Sensor::lidar}, 0.2);
   Simulator simulator(scenario("room"), config);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <numbers>
 
+#include "lab/simulation/joint_effort.hpp"
 #include "lab/simulation/random.hpp"
 #include "lab/simulation/scenarios.hpp"
 #include "lab/simulation/world.hpp"
@@ -164,6 +165,25 @@ TEST(Walk, WhatTheLegsCannotDoIsAnErrorThatSaysWhenAndWhy) {
   Ground sill;  // a sill between two footprints
   sill.add({0.4, 0.45, 0.05, 0.3, 0.1, 0.1});
   EXPECT_THAT(fault({{.stand = 3, .steps = 6, .gait = {.forward = 0.2, .lift = 0.05}}}, sill), HasSubstr("would hit the ground"));
+}
+
+TEST(JointEffort, LoadedLegsCarryTheRobotAndFreeOnesNothing) {
+  const Walk walk = walk_of("forward");
+  const auto shares = load_shares(walk, 1);
+  EXPECT_EQ(shares[0], 0.5);
+  EXPECT_EQ(shares[1], 0.5);
+  // Standing on bent knees: each knee holds half the weight at the lever of its distance from the line of force.
+  const JointAngles q = walk.joints(1), effort = joint_efforts(walk, 1, 35);
+  const SE3 T = foot_in_pelvis(walk.shape(), Side::left, {q[0], q[1], q[2], q[3], q[4], q[5]});
+  const SE3 thigh = foot_in_pelvis(walk.shape(), Side::left, {q[0], q[1], q[2], 0, 0, 0});
+  const double knee_x = thigh.p.x() / (walk.shape().thigh + walk.shape().shin) * walk.shape().thigh;  // before the hip
+  const double lever = knee_x - T.p.x() - (walk.shape().heel + walk.shape().toe) / 2;
+  EXPECT_NEAR(std::abs(effort[3]), 35 * 9.80665 / 2 * std::abs(lever), 0.5);
+  const auto& print = walk.plan().prints[0][2];
+  const JointAngles swinging = joint_efforts(walk, print.lift + 0.1, 35);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(swinging[i], 0);
+  EXPECT_GT(std::abs(swinging[9]), 5);
+  EXPECT_NEAR(load_shares(walk, print.lift + 0.1)[1], 1, 1e-9);
 }
 
 TEST(Biped, InverseKinematicsIsTheInverseOfTheKinematics) {

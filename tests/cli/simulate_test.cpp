@@ -75,6 +75,13 @@ TEST(Simulate, AWalkIsWrittenReadByOthersAndRunOn) {
   walk.expect_that_kilvo_runs_on_it();
 }
 
+TEST(Simulate, TheSameSeedGivesTheSameBytes) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a", "b"}) ASSERT_EQ(kilvo({"simulate", "stairs", "--out", folder / name, "--duration", "0.3"}).code, 0);
+  EXPECT_TRUE(read_text(folder / "a/recording.bag") == read_text(folder / "b/recording.bag"));
+  EXPECT_TRUE(read_text(folder / "a/imu_truth.csv") == read_text(folder / "b/imu_truth.csv"));
+}
+
 TEST(Simulate, WhatCannotBeDoneIsSaid) {
   const TemporaryFolder folder;
   const auto expect_error = [&](const std::vector<std::string>& words, const std::string& text) {
