@@ -16,7 +16,7 @@ enum : std::uint8_t { x, y, z, yaw, phase, sway, bob, roll, pitch, twist, lean }
 
 // An impact rings at this frequency and dies away at this rate. It sets in like an error function, `onset` wide: that leaves next to
 // nothing above 100 Hz, so that 200 samples a second are enough to integrate it.
-constexpr double ring_frequency = 2 * pi * 28, ring_decay = 25, ring_onset = 0.004, ring_delay = 0.021;
+constexpr double ring_frequency = 2 * pi * 28, ring_decay = 25, ring_onset = 0.005, ring_delay = 0.027;
 constexpr double ring_length = 1.2;  // s; less than a picometre is left then
 
 // Displacement per unit of acceleration, m per m/s^2.
