@@ -144,8 +144,8 @@ std::optional<Measurement> FailingSource::next() {
     const auto due = held_.upper_bound(now);
     for (auto it = held_.begin(); it != due; ++it) ready_.push_back(std::move(it->second));
     held_.erase(held_.begin(), due);
-    if (measurement) take(*std::move(measurement), now);
     if (!measurement && ready_.empty()) return std::nullopt;
+    if (measurement) take(*std::move(measurement), now);
   }
   Measurement out = std::move(ready_.front());
   ready_.pop_front();
