@@ -136,7 +136,7 @@ Colour World::radiance(const Hit& hit, double pixel) const {
   constexpr double lens = 1.5;  // pixels; a lens blurs so much
   // A pixel sees an ellipse, long where the surface is grazed: several round looks along it.
   const double across = lens * hit.range * pixel, along = across / std::max(hit.cosine, 0.05);
-  const int looks = std::clamp(static_cast<int>(1.4 * along / across), 1, 8);
+  const int looks = std::clamp(static_cast<int>(1.2 * along / across) + 1, 1, 8);
   const double level = Texture::level_for(std::max(across, along / looks));
   const Eigen::Vector2d middle = Eigen::Vector2d(hit.u, hit.v) + face.offset, heading = hit.heading.normalized();
   const Texture& texture = textures_[static_cast<std::size_t>(material.pattern)];
