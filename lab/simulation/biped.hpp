@@ -56,7 +56,7 @@ struct LegSolution {
 LegSolution solve_leg(const BipedShape& shape, Side side, const SE3& T_pelvis_foot);
 
 /// The foot link in the pelvis.
-SE3 foot_in_pelvis(const BipedShape& shape, Side side, const LegAngles& angles);
+SE3 foot_in_pelvis(const BipedShape& shape, Side side, const LegAngles& q);
 
 /// The URDF document.
 std::string urdf_of(const BipedShape& shape);

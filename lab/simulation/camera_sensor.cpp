@@ -51,7 +51,7 @@ double exposure_at(const CameraModel& m, double t) {
 CameraSensor::CameraSensor(const SimulatorConfig& config, const World& world) : config_(config), world_(world) {
   const CameraModel& m = config.camera;
   for (int v = 0; v < m.height; ++v) {
-    for (int u = 0; u < m.width; ++u) directions_.push_back(unproject(m, {u, v}).cast<float>());
+    for (int u = 0; u < m.width; ++u) directions_.emplace_back(unproject(m, {u, v}).cast<float>());
   }
   Random random(config.seed, stream);
   double sum = 0, squares = 0;
@@ -66,6 +66,7 @@ Image CameraSensor::image(std::int64_t index, double t, const std::function<SE3(
   const double exposure = exposure_at(m, t);
   const int samples = std::max(1, m.blur_samples);
   std::vector<SE3> poses;
+  poses.reserve(static_cast<std::size_t>(samples));
   for (int k = 0; k < samples; ++k) poses.push_back(torso_at(t + exposure * ((k + 0.5) / samples - 0.5)) * m.T_torso_camera);
   const auto brightness = static_cast<float>(255 * exposure * m.gain / samples);
   const auto read = static_cast<float>(m.read_noise * m.read_noise), photon = static_cast<float>(m.photon_noise);

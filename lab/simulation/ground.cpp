@@ -19,7 +19,7 @@ double Ground::height(double x, double y) const {
 SE3 Ground::footing(const BipedShape& shape, double x, double y, double yaw) const {
   const SO3 turn = SO3::Exp({0, 0, yaw});
   const auto corners = shape.sole();
-  const Eigen::Vector3d low = corners[1], high = corners[2];  // heel right, toe left
+  const Eigen::Vector3d &low = corners[1], &high = corners[2];  // heel right, toe left
   std::vector<Eigen::Vector3d> points;
   double highest = -1e9;
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();

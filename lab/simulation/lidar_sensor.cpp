@@ -44,7 +44,8 @@ Eigen::Vector3d ray_direction(const LidarModel& model, int i, double t, double p
   const int lines = model.scan == LidarModel::Scan::lines_16 ? 16 : 64;
   const double span = model.scan == LidarModel::Scan::lines_16 ? 30 : 45;
   const int columns = model.points / lines;
-  const double azimuth = phase - 2 * pi * (i / lines) / std::max(columns, 1);
+  const int column = i / lines;
+  const double azimuth = phase - 2 * pi * column / std::max(columns, 1);
   return from_angles(azimuth, (-span / 2 + span * (i % lines) / (lines - 1)) * degree);
 }
 

@@ -235,7 +235,8 @@ TEST(Lidar, TheMiddleOfTheCorridorSaysNothingAboutTheWayAlongIt) {
   config.lidar.points = 2000;
   const LidarSensor lidar(config, world, corridor.lidar_range);
   const auto along = [&](double x) {
-    const SE3 T_WT{SO3(), {x, 0, 0.8}};
+    SE3 T_WT;
+    T_WT.p = {x, 0, 0.8};
     double sum = 0, n = 0;
     for (const LidarPoint& p : lidar
                                    .scan(
@@ -263,7 +264,10 @@ TEST(Camera, ProjectionAndItsInverseAgree) {
 
 float bilinear(const Image& image, const Eigen::Vector2d& p) {
   const int x = static_cast<int>(p.x()), y = static_cast<int>(p.y());
-  const auto at = [&](int i, int j) { return static_cast<float>(image.pixels[static_cast<std::size_t>(3 * (j * image.width + i) + 1)]); };
+  const auto at = [&](int i, int j) {
+    return static_cast<float>(
+        image.pixels[3 * (static_cast<std::size_t>(j) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(i)) + 1]);
+  };
   const auto fx = static_cast<float>(p.x() - x), fy = static_cast<float>(p.y() - y);
   return (1 - fy) * ((1 - fx) * at(x, y) + fx * at(x + 1, y)) + fy * ((1 - fx) * at(x, y + 1) + fx * at(x + 1, y + 1));
 }

@@ -15,6 +15,11 @@ constexpr double side = size * texel;
 
 using Grid = std::vector<float>;
 
+// Of a texel, or of a cell of n in a row.
+std::size_t index_of(int x, int y, int n = size) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(n) + static_cast<std::size_t>(x);
+}
+
 // std::floor for what fits an int64; on plain x86-64 that is a call into the library, and every pixel asks many times.
 double whole(double x) {
   const auto i = static_cast<double>(static_cast<std::int64_t>(x));
@@ -26,7 +31,7 @@ void add_noise(Grid& grid, int cell, float amplitude, Random random) {
   const int n = size / cell;
   std::vector<float> lattice(static_cast<std::size_t>(n) * static_cast<std::size_t>(n));
   for (float& value : lattice) value = static_cast<float>(random.uniform(-1, 1)) * amplitude;
-  const auto at = [&](int i, int j) { return lattice[static_cast<std::size_t>((j % n) * n + i % n)]; };
+  const auto at = [&](int i, int j) { return lattice[index_of(i % n, j % n, n)]; };
   for (int y = 0; y < size; ++y) {
     const int j = y / cell;
     const auto fy = static_cast<float>(y % cell) / static_cast<float>(cell), wy = fy * fy * (3 - 2 * fy);
@@ -34,7 +39,7 @@ void add_noise(Grid& grid, int cell, float amplitude, Random random) {
       const int i = x / cell;
       const auto fx = static_cast<float>(x % cell) / static_cast<float>(cell), wx = fx * fx * (3 - 2 * fx);
       const float low = at(i, j) + wx * (at(i + 1, j) - at(i, j)), high = at(i, j + 1) + wx * (at(i + 1, j + 1) - at(i, j + 1));
-      grid[static_cast<std::size_t>(y * size + x)] += low + wy * (high - low);
+      grid[index_of(x, y)] += low + wy * (high - low);
     }
   }
 }
@@ -46,7 +51,7 @@ void add_rectangles(Grid& grid, int count, int least, int most, Random& random) 
     const int w = between(least, most), h = between(least, most), x0 = between(0, size - 1), y0 = between(0, size - 1);
     const auto value = static_cast<float>(random.uniform());
     for (int y = y0; y < y0 + h; ++y) {
-      for (int x = x0; x < x0 + w; ++x) grid[static_cast<std::size_t>((y % size) * size + x % size)] = value;
+      for (int x = x0; x < x0 + w; ++x) grid[index_of(x % size, y % size)] = value;
     }
   }
 }
@@ -54,14 +59,14 @@ void add_rectangles(Grid& grid, int count, int least, int most, Random& random) 
 // A wall of blocks of w x h texels with joints; every other row is shifted by `shift`.
 void add_blocks(Grid& grid, int w, int h, int shift, int joint, Random random) {
   const int columns = size / w, rows = size / h;
-  std::vector<float> tone(static_cast<std::size_t>(columns * rows));
+  std::vector<float> tone(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
   for (float& value : tone) value = static_cast<float>(random.uniform(-0.2, 0.2));
   for (int y = 0; y < size; ++y) {
     const int row = y / h;
     for (int x = 0; x < size; ++x) {
       const int moved = (x + (row % 2) * shift) % size, column = moved / w;
       const bool in_joint = y % h < joint || moved % w < joint;
-      grid[static_cast<std::size_t>(y * size + x)] += in_joint ? -0.35F : tone[static_cast<std::size_t>(row * columns + column)];
+      grid[index_of(x, y)] += in_joint ? -0.35F : tone[index_of(column, row, columns)];
     }
   }
 }
