@@ -18,10 +18,10 @@ inline constexpr int max_corners = 8;
 
 /// One foot relative to the IMU, in the IMU frame.
 struct FootPose {
-  SO3 R_IF;                                       // h_R(alpha) of Eq. 2
-  int corners = 0;                                // points of the sole in use
-  std::array<Eigen::Vector3d, max_corners> p{};   // the sole's corner points, m
-  std::array<Eigen::Vector3d, max_corners> v{};   // their velocities relative to the IMU, m/s
+  SO3 R_IF;                                      // h_R(alpha) of Eq. 2
+  int corners = 0;                               // points of the sole in use
+  std::array<Eigen::Vector3d, max_corners> p{};  // the sole's corner points, m
+  std::array<Eigen::Vector3d, max_corners> v{};  // their velocities relative to the IMU, m/s
 };
 
 struct Feet {
@@ -47,7 +47,8 @@ class LegKinematics {
   ~LegKinematics();
 
   /// The feet, or why they cannot be known: "not finite", "joint NAME is missing", ... Joints are matched by name, in any order; a message
-  /// without velocities gets the difference to the message before. Allocates only when the names in the message change.
+  /// without velocities gets the difference to the message before, so the first of them only begins it. Allocates only when the names in
+  /// the message change.
   std::variant<Feet, std::string> feet(const JointSample& sample);
 
  private:
