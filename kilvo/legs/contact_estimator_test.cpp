@@ -117,11 +117,12 @@ TEST(ContactEstimator, NoStepIsMissedOrSeenTwiceFromTheFirstOneOn) {
   }
 }
 
-TEST(ContactEstimator, AtLowerRatesChangesAreFoundWithinThreeSamples) {
+TEST(ContactEstimator, AtLowerRatesChangesAreFoundThreeSamplesAfterTheyCanBeSeen) {
   for (const double rate : {200.0, 100.0}) {
     SCOPED_TRACE(rate);
     const Gait gait;
-    expect_changes(gait, watch(walk(gait), 9, rate), 4.2, 8.45, 0.015, std::max(0.015, 3.5 / rate));
+    // A foot that leaves is faster than a tenth of its swing after 11 ms.
+    expect_changes(gait, watch(walk(gait), 9, rate), 4.2, 8.45, 0.015, 0.011 + 3 / rate);
   }
 }
 
@@ -133,7 +134,8 @@ TEST(ContactEstimator, TheSlowApexOfASwingInPlaceIsNoTouchdown) {
     gait.lift = lift;
     gait.swing = 0.5;
     gait.stance = 0.6;
-    expect_changes(gait, watch(walk(gait), 10), 4.2, 9.45, 0.02, 0.02);
+    // Rising without a jerk: after 30 ms a tenth of the swing's speed is reached.
+    expect_changes(gait, watch(walk(gait), 10), 4.2, 9.45, 0.02, 0.035);
   }
 }
 
@@ -151,7 +153,9 @@ TEST(ContactEstimator, AFootThatSlidesSlowlyStaysOn) {
   Scene scene = standing();
   scene.sole = [=](std::size_t side, double s) {
     SoleMotion out{{0, side == 0 ? 0.1 : -0.1, 0}};
-    if (side == 0) out.p.x() = slide * (s - 7), out.v.x() = slide;
+    if (side == 1) return out;
+    out.p.x() = slide * (s - 7.2);
+    out.v.x() = slide;
     return out;
   };
   watch(estimator, standing(), 6.5, 7.2);
@@ -164,14 +168,11 @@ TEST(ContactEstimator, SoftGroundThatThrowsAFootUpByFiveMillimetresIsNoLiftOff) 
   constexpr double lasts = 0.05, height = 0.005;
   scene.sole = [gait](std::size_t side, double s) {
     SoleMotion out = gait.sole(side, s);
-    for (double back = 0; back < lasts && s > gait.first + gait.cycle(); back += lasts) {
-      // The time since touchdown, when it is short.
-      const double swung = gait.swinging(side, s - lasts);
-      if (swung < 0 || !gait.stands(side, s)) break;
-      const double u = (swung + lasts - gait.swing) / lasts;
-      out.p.z() += height * std::sin(std::numbers::pi * u);
-      out.v.z() += height * std::numbers::pi / lasts * std::cos(std::numbers::pi * u);
-    }
+    const double swung = gait.swinging(side, s - lasts);
+    if (swung < 0 || !gait.stands(side, s)) return out;
+    const double u = (swung + lasts - gait.swing) / lasts;  // since touchdown
+    out.p.z() += height * std::sin(std::numbers::pi * u);
+    out.v.z() += height * std::numbers::pi / lasts * std::cos(std::numbers::pi * u);
     return out;
   };
   expect_changes(gait, watch(scene, 9), 4.2, 8.45, 0.015, 0.015);
@@ -228,7 +229,7 @@ TEST(ContactEstimator, OfALiftedRobotTheFeetLeaveAndStandWhileTheyHangStill) {
 TEST(ContactEstimator, ARestartForgetsTheFeetButNotTheRobot) {
   ContactEstimator estimator{LegConfig{}};
   const Gait gait;
-  watch(estimator, walk(gait), 0, 6.1);
+  watch(estimator, walk(gait), 0, 6.25);
   ASSERT_FALSE(estimator.contacts().on[0] && estimator.contacts().on[1]);
   const double speed = estimator.swing_speed();
   estimator.restart();
