@@ -122,6 +122,7 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   accel_scale_ = start.accel_scale;
   estimate_ = anchor_ = closed_ = start.estimate;
   last_sweep_ = start.estimate.t;
+  if (uses(Sensor::legs)) last_legs_ = start.estimate.t;  // until they turn out to be silent
   trajectory_.push(estimate_->t, estimate_->x.pose(), estimate_->x.v);
   if (!start.still) statistics_.warnings.push_back("the robot did not stand still: started on the move, with wide uncertainties");
   const double norm = start.resting_norm * start.accel_scale;
