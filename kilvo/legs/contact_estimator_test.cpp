@@ -145,6 +145,21 @@ TEST(ContactEstimator, StandingWithNoisyVelocitiesNeverLifts) {
   EXPECT_TRUE(watch(scene, 20).empty());
 }
 
+TEST(ContactEstimator, OneOrTwoWildSamplesAreNoLiftOff) {
+  for (const double rate : {1000.0, 100.0}) {
+    for (const int wild : {1, 2, 4}) {
+      SCOPED_TRACE(testing::Message() << wild << " samples at " << rate << " Hz");
+      Scene scene = standing();
+      scene.sole = [=](std::size_t side, double s) {
+        const double samples = (s - 2) * rate;
+        const bool off = samples > -0.5 && samples < wild - 0.5;
+        return SoleMotion{{0, side == 0 ? 0.1 : -0.1, 0}, {off ? 3.0 : 0.0, 0, 0}};
+      };
+      EXPECT_EQ(watch(scene, 2.1, rate).empty(), wild <= 2);
+    }
+  }
+}
+
 TEST(ContactEstimator, AFootThatSlidesSlowlyStaysOn) {
   ContactEstimator estimator{LegConfig{}};
   const Gait gait;
@@ -197,6 +212,41 @@ TEST(ContactEstimator, AWalkThatBecomesARunIsFollowed) {
   for (Change& c : run) c.s -= 6;
   expect_changes(fast, run, 0.5, 5.5, 0.02, 0.02);
   EXPECT_GT(estimator.swing_speed(), 1.5 * walking);
+}
+
+TEST(ContactEstimator, ARunThatBecomesASlowWalkIsFollowed) {
+  Gait fast, slow;
+  fast.step = 1.5;
+  fast.lift = 0.15;
+  fast.stance = 0.25;
+  slow.step = 0.25;
+  slow.lift = 0.025;
+  slow.first = 0;
+  ContactEstimator estimator{LegConfig{}};
+  watch(estimator, walk(fast), 0, 6.02);
+  ASSERT_GT(estimator.swing_speed(), 5);
+  watch(estimator, standing(), 6.02, 7.0);
+  Scene later = walk(slow);
+  later.sole = [slow](std::size_t side, double s) { return slow.sole(side, s - 7); };
+  later.body = [slow](double s) { return slow.body(s - 7); };
+  std::vector<Change> walked = watch(estimator, later, 7.0, 17.0);
+  for (Change& c : walked) c.s -= 7;
+  expect_changes(slow, walked, 6.5, 9.5, 0.015, 0.015);
+}
+
+TEST(ContactEstimator, OneWildSampleInASwingDoesNotMakeTheRobotFast) {
+  const Gait gait;
+  ContactEstimator estimator{LegConfig{}};
+  Scene scene = walk(gait);
+  scene.sole = [gait](std::size_t side, double s) {
+    SoleMotion out = gait.sole(side, s);
+    if (side == 0 && std::abs(s - 3.7) < 4e-4) out.v.x() += 40;
+    return out;
+  };
+  ASSERT_FALSE(gait.stands(0, 3.7));
+  const std::vector<Change> all = watch(estimator, scene, 0, 9);
+  expect_changes(gait, all, 4.2, 8.45, 0.015, 0.015);
+  EXPECT_LT(estimator.swing_speed(), 3);
 }
 
 TEST(ContactEstimator, ARobotThatIsAlreadyWalkingIsUnderstoodAfterItsFirstSteps) {
