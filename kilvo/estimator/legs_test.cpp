@@ -50,7 +50,7 @@ JointSample feet_at_rest(const lab::AnalyticRoom& room, Time t) {
 
 // `edit` may change a measurement or, by returning false, keep it away; it is given the time since the start, s.
 Drive drive(const lab::AnalyticRoomConfig& room_config, std::array<bool, sensor_count> used,
-        const std::function<bool(Measurement&, double)>& edit = {}) {
+            const std::function<bool(Measurement&, double)>& edit = {}) {
   lab::AnalyticRoom room(room_config);
   Robot robot;
   robot.lidar.T_imu_lidar = room_config.T_imu_lidar;
@@ -202,6 +202,34 @@ TEST(Legs, FrozenEncodersOfOneFootBreakNothingWhileTheLidarSees) {
     EXPECT_LT(r.worst_position, 0.05);
     EXPECT_LT(r.last_position, 0.03);
   }
+}
+
+TEST(Legs, FrozenEncodersOfOneFootAreOutlivedWithoutLidar) {
+  auto config = swaying();
+  config.duration = 5;
+  JointSample last;
+  const Drive r = drive(config, imu_and_legs, [&](Measurement& m, double s) {
+    auto* legs = std::get_if<JointSample>(&m);
+    if (legs == nullptr) return true;
+    if (s < 3.5) last = *legs;
+    for (std::size_t i = 0; s >= 3.5 && i < 3; ++i) {
+      legs->position[i] = last.position[i];
+      legs->velocity[i] = 0;
+    }
+    return true;
+  });
+  expect_sane(r);
+  EXPECT_LT(r.worst_position, 0.3) << "1.5 s; the body moves at 0.6 m/s";
+}
+
+TEST(Legs, ThatNeverSpeakAreLostAfter50Milliseconds) {
+  auto config = swaying();
+  config.duration = 3;
+  const Drive r = drive(config, all_three, [](Measurement& m, double) { return sensor_of(m) != Sensor::legs; });
+  expect_sane(r);
+  EXPECT_EQ(modalities(r), (std::vector<std::string>{"LI, legs lost"}));
+  EXPECT_LT(r.worst_position, 0.005);
+  EXPECT_GT(r.outputs.size(), 580u);
 }
 
 TEST(Legs, ThatAreNotUsedAreCounted) {
