@@ -13,9 +13,10 @@ using std::chrono::milliseconds;
 constexpr double froude_share = 0.4;
 // How much a new swing counts.
 constexpr double swing_gain = 0.3;
-// A swing shorter than this, or slower than a third of the usual, teaches nothing.
+// A swing shorter than this, or slower than a third of the usual, teaches nothing; but several slow ones in a row are how it walks now.
 constexpr Duration shortest_swing = milliseconds(120);
 constexpr double slowest_swing = 0.3;
+constexpr int patience = 4;
 // While it settles, a foot must be faster than this share to be lifted: soft ground bounces.
 constexpr double settling_factor = 7;
 // A cue must last so long. At low rates so many samples.
@@ -52,7 +53,7 @@ FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d
 
 void ContactEstimator::start(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion) {
   const double leg = std::max(std::abs((x.R * feet.foot[0].p[0]).z()), std::abs((x.R * feet.foot[1].p[0]).z()));
-  if (swing_speed_ == 0) swing_speed_ = froude_share * std::sqrt(standard_gravity * std::max(leg, 0.1));
+  if (swing_speed_ == 0) swing_speed_ = first_guess_ = froude_share * std::sqrt(standard_gravity * std::max(leg, 0.1));
   for (std::size_t side = 0; side < 2; ++side) {
     FootState& f = foot_[side];
     f = {};
@@ -99,6 +100,13 @@ bool ContactEstimator::lands(FootState& f, const FootMotion& m, Time t) const {
   return slow_long && t - *f.slow >= still_frames;
 }
 
+void ContactEstimator::learn(double peak, Duration swing) {
+  if (swing <= shortest_swing) return;
+  slow_swings_ = peak > slowest_swing * swing_speed_ ? 0 : slow_swings_ + 1;
+  const bool walks_so = slow_swings_ > patience && peak > slowest_swing * first_guess_;
+  if (slow_swings_ == 0 || walks_so) swing_speed_ += swing_gain * (peak - swing_speed_);
+}
+
 // Deviation of the acceleration from its usual values (while a foot swings, or from the start), in their standard deviations.
 void ContactEstimator::deviate(const Eigen::Vector3d& accel, double dt) {
   constexpr double least_variance = 1e-4;  // (m/s^2)^2
@@ -122,15 +130,16 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
   for (std::size_t side = 0; side < 2; ++side) {
     FootState& f = foot_[side];
     const FootMotion& m = motion[side];
+    // One wild sample is no peak.
+    if (f.count > 0) f.peak = std::max(f.peak, std::min(m.speed, f.samples[(f.count - 1) % history].speed));
     f.samples[f.count++ % history] = {feet.t, m.speed, m.vertical};
-    f.peak = std::max(f.peak, m.speed);
     if (contacts_.on[side] && lifts(f, m, feet.t)) {
       contacts_.on[side] = false;
       f.since = feet.t;
-      f.peak = m.speed;
+      f.peak = 0;
       f.moving.reset();
     } else if (!contacts_.on[side] && lands(f, m, feet.t)) {
-      if (f.peak > slowest_swing * swing_speed_ && feet.t - f.since > shortest_swing) swing_speed_ += swing_gain * (f.peak - swing_speed_);
+      learn(f.peak, feet.t - f.since);
       contacts_.on[side] = true;
       f.since = feet.t;
       f.impact.reset();

@@ -56,7 +56,7 @@ class ContactEstimator {
     std::array<Sample, history> samples{};
     std::size_t count = 0;
     Time since{};                              // of the present phase
-    double peak = 0;                           // speed in this swing
+    double peak = 0;                           // speed in this swing, held for two samples
     std::optional<Time> moving, impact, slow;  // since when the cue has been there
     double ground_z = 0;                       // height of the last place it stood on
   };
@@ -64,12 +64,14 @@ class ContactEstimator {
   bool lifts(FootState& f, const FootMotion& m, Time t) const;
   bool lands(FootState& f, const FootMotion& m, Time t) const;
   bool held(std::optional<Time>& since, bool cue, Time t, Duration at_least) const;
+  void learn(double peak, Duration swing);
   void deviate(const Eigen::Vector3d& accel, double dt);
 
   LegConfig config_;
   Contacts contacts_;
   bool started_ = false;
-  double swing_speed_ = 0;
+  double swing_speed_ = 0, first_guess_ = 0;  // m/s
+  int slow_swings_ = 0;                       // in a row
   Duration period_{};
   std::array<FootState, 2> foot_;
   Eigen::Vector3d accel_mean_ = Eigen::Vector3d::Zero(), accel_variance_ = Eigen::Vector3d::Zero();

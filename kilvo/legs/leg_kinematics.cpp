@@ -4,6 +4,7 @@
 #include <cmath>
 #include <kdl/chainfksolvervel_recursive.hpp>
 #include <kdl/tree.hpp>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <urdf_parser/urdf_parser.h>
@@ -93,7 +94,7 @@ struct LegKinematics::Chains {
   Time last_t{};
 
   std::optional<std::string> find_places(const std::vector<std::string>& names);
-  const std::vector<double>& velocity_of(const JointSample& s);
+  const std::vector<double>* velocity_of(const JointSample& s);  // nullptr: not known
   FootPose pose_of(std::size_t side, const JointSample& s, const std::vector<double>& velocity);
 };
 
@@ -112,24 +113,30 @@ std::optional<std::string> LegKinematics::Chains::find_places(const std::vector<
     }
   }
   message_names = names;
+  last_position.clear();
   return std::nullopt;
 }
 
-const std::vector<double>& LegKinematics::Chains::velocity_of(const JointSample& s) {
-  if (s.velocity.size() == s.position.size()) return s.velocity;
+const std::vector<double>* LegKinematics::Chains::velocity_of(const JointSample& s) {
+  if (s.velocity.size() == s.position.size()) return &s.velocity;
   const double dt = to_seconds(s.t - last_t);
   constexpr double longest = 0.1;      // s
   constexpr double smoothing = 0.001;  // s, of the low pass over the differences
-  velocity.resize(s.position.size(), 0.0);
-  if (last_position.size() == s.position.size() && dt > 0 && dt < longest) {
+  velocity.resize(s.position.size());
+  const bool known = last_position.size() == s.position.size() && dt > 0 && dt < longest;
+  if (known) {
     const double share = dt / (dt + smoothing);
-    for (std::size_t i = 0; i < velocity.size(); ++i) velocity[i] += share * ((s.position[i] - last_position[i]) / dt - velocity[i]);
+    for (std::size_t i = 0; i < velocity.size(); ++i) {
+      const double difference = (s.position[i] - last_position[i]) / dt;
+      // After a gap or a joint that was not finite the low pass begins anew.
+      velocity[i] = std::isfinite(velocity[i]) ? velocity[i] + share * (difference - velocity[i]) : difference;
+    }
   } else {
-    std::ranges::fill(velocity, 0.0);
+    std::ranges::fill(velocity, std::numeric_limits<double>::quiet_NaN());
   }
   last_position = s.position;
   last_t = s.t;
-  return velocity;
+  return known ? &velocity : nullptr;
 }
 
 FootPose LegKinematics::Chains::pose_of(std::size_t side, const JointSample& s, const std::vector<double>& velocity_of_all) {
@@ -192,11 +199,12 @@ std::variant<Feet, std::string> LegKinematics::feet(const JointSample& s) {
   } else if (s.position.size() < 6) {
     return "two feet need six positions";
   }
-  const std::vector<double>& velocity = c.velocity_of(s);
+  const std::vector<double>* velocity = c.velocity_of(s);
+  if (velocity == nullptr) return "without velocities a message needs one shortly before it";
   Feet out;
   out.t = s.t;
   for (std::size_t side = 0; side < 2; ++side) {
-    out.foot[side] = c.pose_of(side, s, velocity);
+    out.foot[side] = c.pose_of(side, s, *velocity);
     for (int i = 0; i < out.foot[side].corners; ++i) {
       if (!out.foot[side].p[static_cast<std::size_t>(i)].allFinite() || !out.foot[side].v[static_cast<std::size_t>(i)].allFinite())
         return "not finite";

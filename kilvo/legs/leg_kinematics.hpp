@@ -47,7 +47,8 @@ class LegKinematics {
   ~LegKinematics();
 
   /// The feet, or why they cannot be known: "not finite", "joint NAME is missing", ... Joints are matched by name, in any order; a message
-  /// without velocities gets the difference to the message before. Allocates only when the names in the message change.
+  /// without velocities gets the difference to the message before, so the first of them only begins it. Allocates only when the names in
+  /// the message change.
   std::variant<Feet, std::string> feet(const JointSample& sample);
 
  private:

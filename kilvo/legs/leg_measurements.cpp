@@ -80,8 +80,7 @@ void begin_stance(Estimate& e, std::size_t side, const SolePoint& point, const L
   const int pc = at::pcl + 3 * static_cast<int>(side);
   const Eigen::Matrix3d J_R = -e.x.R.matrix() * skew(point.p);
   e.x.pc[side] = e.x.pose() * point.p;
-  Eigen::Matrix<double, 3, at::size> cross = J_R * e.P.middleRows<3>(at::R) + e.P.middleRows<3>(at::p);
-  cross.middleCols<3>(pc).setZero();
+  const Eigen::Matrix<double, 3, at::size> cross = J_R * e.P.middleRows<3>(at::R) + e.P.middleRows<3>(at::p);
   const Eigen::Matrix3d own = cross.middleCols<3>(at::R) * J_R.transpose() + cross.middleCols<3>(at::p);
   e.P.middleRows<3>(pc) = cross;
   e.P.middleCols<3>(pc) = cross.transpose();

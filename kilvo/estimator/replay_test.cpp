@@ -1,0 +1,197 @@
+#include "kilvo/estimator/replay.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/helpers/random_state.hpp"
+
+namespace kilvo {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+const Time begin_time = time_from_ns(1'700'000'000'000'000'000);
+
+ImuSample imu_at(Duration since) {
+  const double s = to_seconds(since);
+  return {begin_time + since,
+          {0.3 * std::sin(7 * s), 0.2 * std::cos(5 * s), 0.4 * std::sin(3 * s)},
+          {std::sin(11 * s), std::cos(9 * s), standard_gravity + 2 * std::sin(13 * s)}};
+}
+
+// Feet at rest under a body that sways; the right one stands from 0.1 s to 0.3 s.
+LegStep leg_at(Duration since) {
+  const double s = to_seconds(since);
+  LegStep step;
+  step.t = begin_time + since;
+  step.dt = 0.001;
+  for (std::size_t side = 0; side < 2; ++side) {
+    Stance& foot = step.foot[side];
+    foot.begins = side == 0 ? since == microseconds(1000) : since == milliseconds(100);
+    foot.ends = side == 1 && since == milliseconds(300);
+    foot.used = side == 0 || (since >= milliseconds(100) && since < milliseconds(300));
+    foot.point.p = {0.05 * std::sin(4 * s), side == 0 ? 0.1 : -0.1, -0.75};
+    foot.point.v = {0.2 * std::cos(4 * s), 0.01, 0};
+    if (!foot.begins) foot.shift = {1e-5, 0, 0};
+    foot.looseness = 1 + s;
+  }
+  return step;
+}
+
+// IMU at 200 Hz and legs at 1 kHz for so long; the legs a little beside the IMU, or none.
+Replay recorded(Duration length, Duration beside = microseconds(0), bool with_legs = true) {
+  EstimatorConfig config;
+  Replay replay(config);
+  for (Duration t{}; t <= length; t += milliseconds(5)) replay.add(imu_at(t));
+  for (Duration t = milliseconds(1); with_legs && t <= length; t += milliseconds(1)) {
+    LegStep step = leg_at(t);
+    step.t += beside;
+    replay.add(step);
+  }
+  return replay;
+}
+
+Estimate start() {
+  test::Random random(1);
+  Estimate e;
+  e.t = begin_time;
+  e.x.R = SO3::Exp({0.02, -0.03, 0.5});
+  e.x.v = {0.1, 0, 0};
+  e.x.bg = {0.002, -0.001, 0.003};
+  e.P = random.covariance<at::size>(0.01);
+  for (std::size_t side = 0; side < 2; ++side) end_stance(e, side);
+  return e;
+}
+
+Estimate advanced(const Replay& replay, Estimate e, Time until) {
+  Trajectory record(std::chrono::seconds(2));
+  replay.advance(e, until, record);
+  return e;
+}
+
+void expect_same(const Estimate& a, const Estimate& b) {
+  EXPECT_EQ(a.t, b.t);
+  EXPECT_EQ(a.x.R.matrix(), b.x.R.matrix());
+  EXPECT_TRUE(boxminus(a.x, b.x).tail<at::size - 3>().isZero(0)) << boxminus(a.x, b.x).transpose();
+  EXPECT_TRUE((a.P - b.P).isZero(0));
+}
+
+TEST(Replay, InPiecesThatEndAtSamplesItIsTheSameBytesAsInOneGo) {
+  const Replay replay = recorded(milliseconds(400));
+  const Time end = begin_time + milliseconds(400);
+  const Estimate whole = advanced(replay, start(), end);
+  EXPECT_GT(boxminus(whole.x, start().x).norm(), 0.01) << "something happened";
+  for (const Duration piece : {milliseconds(1), milliseconds(5), milliseconds(17), milliseconds(100)}) {
+    Estimate e = start();
+    for (Time t = begin_time + piece; t < end; t += piece) e = advanced(replay, e, t);
+    expect_same(advanced(replay, e, end), whole);
+  }
+}
+
+TEST(Replay, InPiecesThatEndAnywhereItIsTheSameButForTheStepOfIntegration) {
+  const Replay replay = recorded(milliseconds(400), microseconds(300));
+  const Time end = begin_time + milliseconds(400);
+  const Estimate whole = advanced(replay, start(), end);
+  Estimate e = start();
+  for (Time t = begin_time + microseconds(3333); t < end; t += microseconds(3333)) e = advanced(replay, e, t);
+  e = advanced(replay, e, end);
+  EXPECT_EQ(e.t, whole.t);
+  EXPECT_LT(boxminus(e.x, whole.x).norm(), 1e-5);
+  EXPECT_LT((e.P - whole.P).norm(), 1e-3 * whole.P.norm());
+}
+
+TEST(Replay, BetweenTwoSamplesBothAreUsedAndAfterTheNewestItIsHeld) {
+  const Replay replay = recorded(milliseconds(5), {}, false);
+  const ImuSample a = imu_at({}), b = imu_at(milliseconds(5));
+  const Time middle = begin_time + milliseconds(2), later = b.t + milliseconds(3);
+  const ProcessNoise noise = EstimatorConfig{}.noise;
+  Estimate expected = predict(start(), ImuInterval::between(a, b, a.t, middle), {}, noise);
+  expect_same(advanced(replay, start(), middle), expected);
+  expected = predict(expected, ImuInterval::between(a, b, middle, b.t), {}, noise);
+  expected = predict(expected, ImuInterval::hold(b, b.t, later), {}, noise);
+  expect_same(advanced(replay, advanced(replay, start(), middle), later), expected);
+}
+
+TEST(Replay, AnIntervalThatIsClosedLaterIsAsIfBothEndsHadBeenKnown) {
+  EstimatorConfig config;
+  Replay replay(config);
+  replay.add(imu_at({}));
+  const Time next = begin_time + milliseconds(5);
+  const Estimate held = advanced(replay, start(), next);
+  replay.add(imu_at(milliseconds(5)));
+  const Estimate closed = advanced(replay, start(), next);
+  expect_same(closed, predict(start(), ImuInterval::between(imu_at({}), imu_at(milliseconds(5)), begin_time, next), {}, config.noise));
+  EXPECT_GT(boxminus(held.x, closed.x).norm(), 1e-6);
+}
+
+TEST(Replay, AStepIsAppliedOnceHoweverOftenItsTimeIsReached) {
+  const Replay replay = recorded(milliseconds(50));
+  for (const int at_ms : {20, 23}) {
+    const Time t = begin_time + milliseconds(at_ms);
+    const Estimate once = advanced(replay, start(), t);
+    expect_same(advanced(replay, once, t), once);
+    Estimate before = advanced(replay, start(), t - milliseconds(1));
+    replay.predict_to(before, t, nullptr);
+    EXPECT_GT((before.P - once.P).norm(), 0) << "the step of that time is in it";
+    EXPECT_EQ(replay.apply(before, leg_at(milliseconds(at_ms))), 1);
+    expect_same(before, once);
+  }
+}
+
+TEST(Replay, StepsBetweenTheSamplesTakeEffectAtTheirOwnTime) {
+  const Replay replay = recorded(milliseconds(120), microseconds(300));
+  const Time step = begin_time + milliseconds(100) + microseconds(300);
+  EXPECT_TRUE((advanced(replay, start(), step - Duration(1)).P.middleRows<3>(at::pcr).isZero(0)));
+  EXPECT_FALSE((advanced(replay, start(), step).P.middleRows<3>(at::pcr).isZero(0)));
+}
+
+TEST(Replay, AFootThatHasLeftIsNoLongerPartOfTheState) {
+  const Replay replay = recorded(milliseconds(350));
+  EXPECT_GT(advanced(replay, start(), begin_time + milliseconds(299)).P(at::pcr, at::pcr), 0);
+  const Estimate after = advanced(replay, start(), begin_time + milliseconds(350));
+  EXPECT_TRUE((after.P.middleRows<3>(at::pcr).isZero(0)));
+  EXPECT_GT(after.P(at::pcl, at::pcl), 0);
+}
+
+TEST(Replay, WhatIsForgottenIsNotNeeded) {
+  const Replay all = recorded(milliseconds(400), microseconds(300));
+  const Time end = begin_time + milliseconds(410);
+  for (const Duration since : {microseconds(0), microseconds(300), microseconds(100'000), microseconds(152'300), microseconds(153'999),
+                               microseconds(398'000), microseconds(400'000), microseconds(400'300), microseconds(405'000)}) {
+    SCOPED_TRACE(to_seconds(since));
+    const Estimate e = advanced(all, start(), begin_time + since);
+    Replay rest = all;
+    rest.forget_before(e.t);
+    expect_same(advanced(rest, e, end), advanced(all, e, end));
+  }
+}
+
+TEST(Replay, AllStatesOnTheWayAreRecorded) {
+  const Replay replay = recorded(milliseconds(100));
+  Trajectory record(std::chrono::seconds(2));
+  Estimate e = start();
+  record.push(e.t, e.x.pose(), e.x.v);
+  replay.advance(e, begin_time + milliseconds(100), record);
+  EXPECT_EQ(record.size(), 101u);
+  EXPECT_EQ(record.newest(), e.t);
+  EXPECT_LT((record.at(e.t)->p - e.x.p).norm(), 1e-15) << "after the step, not before it";
+}
+
+TEST(Replay, AcrossAGapOfTheImuTheCovarianceSaysThatNobodyLooked) {
+  const auto after_gap = [](Duration gap) {
+    EstimatorConfig config;
+    Replay replay(config);
+    for (Duration t{}; t <= milliseconds(200); t += milliseconds(5)) replay.add(imu_at(t));
+    replay.add(imu_at(milliseconds(200) + gap));
+    Estimate e = start();
+    e.P *= 1e-6;
+    Trajectory record(std::chrono::seconds(2));
+    replay.advance(e, begin_time + milliseconds(200) + gap, record);
+    return e.P.block<3, 3>(at::v, at::v).trace();
+  };
+  EXPECT_GT(after_gap(milliseconds(120)), 20 * after_gap(milliseconds(90)));
+  EXPECT_GT(after_gap(milliseconds(500)), after_gap(milliseconds(120)));
+}
+
+}  // namespace
+}  // namespace kilvo

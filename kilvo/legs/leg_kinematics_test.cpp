@@ -1,0 +1,267 @@
+#include "kilvo/legs/leg_kinematics.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <iterator>
+#include <limits>
+
+#include "tests/helpers/test_biped.hpp"
+
+namespace kilvo {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+Feet feet_of(LegKinematics& legs, const JointSample& s) {
+  auto known = legs.feet(s);
+  if (const auto* fault = std::get_if<std::string>(&known)) {
+    ADD_FAILURE() << *fault;
+    return {};
+  }
+  return std::get<Feet>(known);
+}
+
+std::string fault_of(LegKinematics& legs, const JointSample& s) {
+  auto known = legs.feet(s);
+  const auto* fault = std::get_if<std::string>(&known);
+  return fault == nullptr ? "no fault" : *fault;
+}
+
+// The largest distance between corners of both.
+double distance(const Feet& a, const Feet& b) {
+  double worst = 0;
+  for (std::size_t side = 0; side < 2; ++side) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(a.foot[side].corners); ++k) {
+      worst = std::max({worst, (a.foot[side].p[k] - b.foot[side].p[k]).norm(), (a.foot[side].v[k] - b.foot[side].v[k]).norm()});
+    }
+  }
+  return worst;
+}
+
+TEST(LegKinematics, CornersAreWhereAProductOfMatricesPutsThemThroughWaistMountAndPrismaticJoints) {
+  test::Random random(1);
+  const Robot robot = test::biped(random);
+  LegKinematics legs(robot);
+  for (int i = 0; i < 50; ++i) {
+    const JointSample s = test::random_joints(random);
+    const Feet feet = feet_of(legs, s);
+    EXPECT_EQ(feet.t, s.t);
+    for (std::size_t side = 0; side < 2; ++side) {
+      const Eigen::Isometry3d T_IF = test::foot_in_imu(robot, s, side);
+      ASSERT_EQ(feet.foot[side].corners, 4);
+      EXPECT_LT((feet.foot[side].R_IF.matrix() - T_IF.linear()).norm(), 1e-12);
+      for (std::size_t k = 0; k < 4; ++k) EXPECT_LT((feet.foot[side].p[k] - T_IF * robot.feet[side].sole[k]).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(LegKinematics, VelocitiesAreTheDerivativesOfThePositions) {
+  test::Random random(2);
+  LegKinematics legs(test::biped(random));
+  constexpr double h = 1e-6;
+  for (int i = 0; i < 50; ++i) {
+    const JointSample s = test::random_joints(random);
+    JointSample before = s, after = s;
+    for (std::size_t j = 0; j < s.position.size(); ++j) {
+      before.position[j] -= h * s.velocity[j];
+      after.position[j] += h * s.velocity[j];
+    }
+    const Feet now = feet_of(legs, s), a = feet_of(legs, before), b = feet_of(legs, after);
+    for (std::size_t side = 0; side < 2; ++side) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        EXPECT_GT(now.foot[side].v[k].norm(), 1e-3);
+        EXPECT_LT((now.foot[side].v[k] - (b.foot[side].p[k] - a.foot[side].p[k]) / (2 * h)).norm(), 1e-7);
+      }
+    }
+  }
+}
+
+TEST(LegKinematics, TheOrderOfTheJointsAndJointsOfOtherPartsChangeNoBit) {
+  test::Random random(3);
+  LegKinematics legs(test::biped(random));
+  const JointSample s = test::random_joints(random);
+  JointSample other;
+  other.t = s.t;
+  const auto put = [&other](const std::string& name, double q, double dq) {
+    other.names.push_back(name);
+    other.position.push_back(q);
+    other.velocity.push_back(dq);
+  };
+  put("elbow", std::numeric_limits<double>::quiet_NaN(), 3);
+  for (std::size_t j = s.names.size(); j-- > 0;) put(s.names[j], s.position[j], s.velocity[j]);
+  put("neck", 0.4, std::numeric_limits<double>::infinity());
+  const Feet feet = feet_of(legs, s);
+  EXPECT_EQ(distance(feet, feet_of(legs, other)), 0.0);
+  EXPECT_EQ(distance(feet, feet_of(legs, s)), 0.0) << "and back again";
+}
+
+TEST(LegKinematics, AMissingJointIsNamedAndTheNextWholeMessageWorksAgain) {
+  test::Random random(4);
+  LegKinematics legs(test::biped(random));
+  const JointSample whole = test::random_joints(random);
+  const Feet feet = feet_of(legs, whole);
+  JointSample s = whole;
+  s.names[7] = "right_arm";
+  EXPECT_THAT(fault_of(legs, s), AllOf(HasSubstr(whole.names[7]), HasSubstr("locked_joints")));
+  EXPECT_THAT(fault_of(legs, s), HasSubstr(whole.names[7])) << "the second time as well";
+  EXPECT_EQ(distance(feet, feet_of(legs, whole)), 0.0);
+}
+
+TEST(LegKinematics, ALockedJointStaysAtZeroWhateverTheMessageSays) {
+  test::Random random(5);
+  Robot robot = test::biped(random);
+  LegKinematics free(robot);
+  robot.locked_joints = {"waist", "left_3"};
+  LegKinematics locked(robot);
+  JointSample s = test::random_joints(random);
+  const Feet with = feet_of(locked, s);
+  for (std::size_t j = 0; j < s.names.size(); ++j) {
+    if (s.names[j] == "waist" || s.names[j] == "left_3") s.position[j] = s.velocity[j] = 0;
+  }
+  EXPECT_LT(distance(with, feet_of(free, s)), 1e-12);
+  s.names[0] = "not_the_waist";
+  EXPECT_LT(distance(with, feet_of(locked, s)), 1e-12) << "it need not be in the message";
+}
+
+TEST(LegKinematics, WhatIsNotFiniteOrNotAsLongAsTheNamesIsRefused) {
+  test::Random random(6);
+  LegKinematics legs(test::biped(random));
+  const JointSample whole = test::random_joints(random);
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    JointSample s = whole;
+    s.position[9] = bad;
+    EXPECT_EQ(fault_of(legs, s), "not finite");
+    s = whole;
+    s.velocity[2] = bad;
+    EXPECT_EQ(fault_of(legs, s), "not finite");
+  }
+  JointSample s = whole;
+  s.names.pop_back();
+  EXPECT_THAT(fault_of(legs, s), HasSubstr("names"));
+  s.names.clear();
+  EXPECT_THAT(fault_of(legs, s), HasSubstr("names"));
+}
+
+TEST(LegKinematics, WithoutVelocitiesTheDifferencesApproachTheTrueOnes) {
+  test::Random random(7);
+  LegKinematics with(test::biped(random));
+  test::Random again(7);
+  LegKinematics without(test::biped(again));
+  const JointSample start = test::random_joints(random);
+  double first = 0, last = 0;
+  for (int i = 0; i < 300; ++i) {
+    JointSample s = start;
+    const double time = 0.001 * i;
+    s.t = start.t + std::chrono::milliseconds(i);
+    for (std::size_t j = 0; j < s.position.size(); ++j) {
+      s.position[j] += 0.2 * std::sin(2 * time + static_cast<double>(j));
+      s.velocity[j] = 0.4 * std::cos(2 * time + static_cast<double>(j));
+    }
+    const Feet truth = feet_of(with, s);
+    s.velocity.clear();
+    if (i == 0) {
+      EXPECT_THAT(fault_of(without, s), HasSubstr("velocities")) << "from one message nothing is known";
+      continue;
+    }
+    (i == 1 ? first : last) = distance(truth, feet_of(without, s));
+  }
+  EXPECT_LT(first, 0.01);
+  EXPECT_LT(last, 0.01);
+}
+
+TEST(LegKinematics, WithoutVelocitiesAGapOrAnotherOrderOfTheJointsIsNoMotion) {
+  test::Random random(11);
+  LegKinematics legs(test::biped(random));
+  JointSample s = test::random_joints(random);
+  s.velocity.clear();
+  EXPECT_THAT(fault_of(legs, s), HasSubstr("velocities"));
+  s.t += std::chrono::milliseconds(1);
+  EXPECT_LT(feet_of(legs, s).foot[0].v[0].norm(), 1e-12);
+  s.t += std::chrono::milliseconds(1);
+  std::reverse(s.names.begin(), s.names.end());
+  std::reverse(s.position.begin(), s.position.end());
+  EXPECT_THAT(fault_of(legs, s), HasSubstr("velocities"));
+  s.t += std::chrono::milliseconds(1);
+  EXPECT_LT(feet_of(legs, s).foot[0].v[0].norm(), 1e-12);
+  s.t += std::chrono::milliseconds(500);
+  for (double& q : s.position) q += 0.3;
+  EXPECT_THAT(fault_of(legs, s), HasSubstr("velocities"));
+  s.t += std::chrono::milliseconds(1);
+  EXPECT_LT(feet_of(legs, s).foot[0].v[0].norm(), 1e-12);
+}
+
+TEST(LegKinematics, ANonFiniteMessageDoesNotPoisonTheVelocitiesAfterIt) {
+  test::Random random(8);
+  LegKinematics legs(test::biped(random));
+  JointSample s = test::random_joints(random);
+  s.velocity.clear();
+  double speed = 1;
+  for (int i = 0; i < 60; ++i) {
+    s.t += std::chrono::milliseconds(1);
+    JointSample bad = s;
+    if (i == 5) bad.position[4] = std::numeric_limits<double>::quiet_NaN();
+    auto known = legs.feet(bad);
+    if (i == 5) {
+      EXPECT_EQ(std::get<std::string>(known), "not finite");
+    }
+    if (i > 6) {
+      ASSERT_TRUE(std::holds_alternative<Feet>(known)) << "message " << i;
+      speed = std::get<Feet>(known).foot[0].v[0].norm();
+    }
+  }
+  EXPECT_LT(speed, 1e-9);
+}
+
+TEST(LegKinematics, TheTwoFeetMessageIsTurnedMovedAndLoweredToTheSole) {
+  Robot robot;
+  robot.legs.type = "feet";
+  robot.legs.sole_offset = 0.05;
+  robot.legs.T_imu_feet = {SO3::Exp({3.14159265358979, 0, 0}), {0.1, 0.2, 0.3}};  // z down, as in the head of a robot
+  LegKinematics legs(robot);
+  JointSample s;
+  s.position = {1, 2, -3, 4, 5, -6};
+  s.velocity = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+  const Feet feet = feet_of(legs, s);
+  EXPECT_EQ(feet.foot[0].corners, 1);
+  EXPECT_LT((feet.foot[0].p[0] - Eigen::Vector3d(1.1, -1.8, 3.35)).norm(), 1e-12);
+  EXPECT_LT((feet.foot[1].p[0] - Eigen::Vector3d(4.1, -4.8, 6.35)).norm(), 1e-12);
+  EXPECT_LT((feet.foot[0].v[0] - Eigen::Vector3d(0.1, -0.2, -0.3)).norm(), 1e-12);
+  EXPECT_LT((feet.foot[1].v[0] - Eigen::Vector3d(0.4, -0.5, -0.6)).norm(), 1e-12);
+  s.position.pop_back();
+  EXPECT_THAT(fault_of(legs, s), HasSubstr("six"));
+}
+
+TEST(LegKinematics, TheFeetOfTheG1AreMirrorImagesAtZeroJoints) {
+  std::ifstream file(KILVO_SOURCE_DIR "/config/robots/g1_12dof.urdf");
+  Robot robot;
+  robot.urdf.assign(std::istreambuf_iterator<char>(file), {});
+  for (std::size_t side = 0; side < 2; ++side) {
+    const std::string name = side == 0 ? "left" : "right";
+    robot.feet[side] = {
+        name, name + "_ankle_roll_link", {{-0.05, 0.025, -0.035}, {-0.05, -0.025, -0.035}, {0.12, 0.03, -0.035}, {0.12, -0.03, -0.035}}};
+  }
+  robot.imu.link = "pelvis";
+  LegKinematics legs(robot);
+  JointSample s;
+  for (const char* side : {"left", "right"}) {
+    for (const char* joint : {"hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll"}) {
+      s.names.push_back(std::string(side) + "_" + joint + "_joint");
+    }
+  }
+  s.position.assign(12, 0.0);
+  s.velocity.assign(12, 0.0);
+  const Feet feet = feet_of(legs, s);
+  constexpr std::array<std::size_t, 4> mirrored = {1, 0, 3, 2};
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Eigen::Vector3d& right = feet.foot[1].p[mirrored[k]];
+    EXPECT_LT((feet.foot[0].p[k] - Eigen::Vector3d(right.x(), -right.y(), right.z())).norm(), 1e-12);
+    EXPECT_GT(feet.foot[0].p[k].y(), 0.08);
+    EXPECT_NEAR(feet.foot[0].p[k].z(), -0.79, 0.02);
+  }
+}
+
+}  // namespace
+}  // namespace kilvo
