@@ -31,7 +31,8 @@ int run(RunWords words) {
   if (words.no_map && !words.map.empty()) throw UsageError("--map and --no-map exclude each other");
   if (!words.map.empty()) options.map = words.map;
   options.with_map = !words.no_map;
-  options.threads = words.threads > 0 ? words.threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  options.threads = words.threads > 0 ? std::min(words.threads, cores) : cores;
   if (!(options.start >= 0) || std::isinf(options.start)) throw UsageError("--start must be a number of seconds, 0 or more");
   if (!(options.duration > 0)) throw UsageError("--duration must be a number of seconds above 0");
   return run_recording(options);

@@ -61,6 +61,15 @@ Json stages_json(const Recap& recap) {
   return out;
 }
 
+// A setting may hold any bytes; a summary is UTF-8.
+Json config_json(const lab::Settings& settings) {
+  std::string text = lab::settings_json(settings);
+  Json json = Json::parse(text, nullptr, false);
+  if (!json.is_discarded()) return json;
+  for (char& c : text) c = (static_cast<unsigned char>(c) & 0x80U) != 0 ? '?' : c;
+  return Json::parse(text, nullptr, false);
+}
+
 }  // namespace
 
 std::vector<std::string> all_warnings(const RunFacts& facts, const lab::RecordingSource& source, const Statistics& statistics) {
@@ -96,7 +105,7 @@ std::string summary_json(const RunFacts& facts, const lab::Settings& settings, c
   json["wall_seconds"] = facts.wall_seconds;
   json["real_time_factor"] = facts.wall_seconds > 0 ? recap.seconds() / facts.wall_seconds : 0;
   json["peak_memory_mb"] = tenths(peak_memory_mb());
-  json["config"] = Json::parse(lab::settings_json(settings));
+  json["config"] = config_json(settings);
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
