@@ -3,12 +3,13 @@
 #   make demo       simulate a small room, run on it, evaluate, show it
 #   make test       build and run every test
 #   make bench      time the functions; RECORDINGS=DIR: time and judge whole recordings as well
+#   make tables     RECORDINGS=DIR: every modality on every recording, as Markdown
 #   make check      layout, walls, sizes, headers, clang-tidy (files that changed since they last passed; ALL=1: every file)
 #   make format     rewrite the sources in the one layout
 #   make fuzz       fuzz the readers, SECONDS_EACH=60 each
 #   make install    into PREFIX=/usr/local
 #   make clean      remove build/
-.PHONY: build demo test bench check format fuzz install clean dependencies dependencies-dev configure
+.PHONY: build demo test bench tables check format fuzz install clean dependencies dependencies-dev configure
 .NOTPARALLEL:
 .DEFAULT_GOAL := build
 
@@ -41,6 +42,9 @@ bench: build
 ifdef RECORDINGS
 	bench/macro/run --kilvo $(KILVO) $(RECORDINGS)
 endif
+
+tables: build
+	@bench/macro/tables --kilvo $(KILVO) $(or $(RECORDINGS),$(error RECORDINGS=DIR says where the recordings are))
 
 check: dependencies-dev configure
 	@scripts/check_rooms

@@ -36,6 +36,7 @@ int parse_and_do(const std::vector<std::string>& words) {
   add_eval_contacts(program, chosen);
   add_report(program, chosen);
   add_config(program, chosen);
+  add_simulate(program, chosen);
   add_demo(program, chosen);
   for (CLI::App* verb : program.get_subcommands({})) verb->group("Verbs");
   program.footer(

@@ -11,7 +11,8 @@ bool is_large(const Measurement& m) { return std::holds_alternative<LidarScan>(m
 
 }  // namespace
 
-ReadAhead::ReadAhead(lab::RecordingSource& source, bool threaded) : source_(source), queue_(most_batches) {
+ReadAhead::ReadAhead(MeasurementSource& source, std::function<double()> progress, bool threaded)
+    : source_(source), source_progress_(std::move(progress)), queue_(most_batches) {
   if (threaded) thread_ = std::thread([this] { read_all(); });
 }
 
@@ -27,7 +28,7 @@ void ReadAhead::read_all() {
         full = is_large(*measurement) || batch.measurements.size() + 1 >= most_in_batch;
         batch.measurements.push_back(*std::move(measurement));
       }
-      batch.progress = source_.progress();
+      batch.progress = source_progress_();
       if (batch.measurements.empty()) break;
       wanted = queue_.push(std::move(batch));
     }
@@ -40,7 +41,7 @@ void ReadAhead::read_all() {
 std::optional<Measurement> ReadAhead::next() {
   if (!thread_.joinable()) {
     auto measurement = source_.next();
-    progress_ = source_.progress();
+    progress_ = source_progress_();
     return measurement;
   }
   if (taken_ == batch_.measurements.size()) {

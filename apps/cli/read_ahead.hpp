@@ -2,18 +2,20 @@
 #pragma once
 
 #include <exception>
+#include <functional>
 #include <thread>
 #include <vector>
 
 #include "apps/cli/bounded_queue.hpp"
-#include "lab/recordings/recording_source.hpp"
+#include "kilvo/sensors/measurement_source.hpp"
 
 namespace kilvo::cli {
 
 class ReadAhead {
  public:
-  /// Without a thread of its own, `threaded` false, it just asks the source. The source must not be touched before stop().
-  ReadAhead(lab::RecordingSource& source, bool threaded);
+  /// `progress`: how far the source is, 0 to 1. Without a thread of its own, `threaded` false, it just asks the source. The source must not
+  /// be touched before stop().
+  ReadAhead(MeasurementSource& source, std::function<double()> progress, bool threaded);
   ~ReadAhead() { stop(); }
   ReadAhead(const ReadAhead&) = delete;
   ReadAhead& operator=(const ReadAhead&) = delete;
@@ -32,7 +34,8 @@ class ReadAhead {
   };
   void read_all();
 
-  lab::RecordingSource& source_;
+  MeasurementSource& source_;
+  std::function<double()> source_progress_;
   BoundedQueue<Batch> queue_;
   Batch batch_;
   std::size_t taken_ = 0;  // of batch_

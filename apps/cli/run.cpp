@@ -27,7 +27,7 @@ int run(RunWords words) {
   options.out = words.out;
   if (!words.config.empty()) options.config = words.config;
   if (words.sensors) options.sensors = parse_sensors(*words.sensors);
-  for (const std::string& text : words.drops) options.drops.push_back(parse_drop(text));
+  for (const std::string& text : words.drops) options.failures.push_back(parse_drop(text));
   if (words.no_map && !words.map.empty()) throw UsageError("--map and --no-map exclude each other");
   if (!words.map.empty()) options.map = words.map;
   options.with_map = !words.no_map;

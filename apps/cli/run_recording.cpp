@@ -37,7 +37,6 @@ lab::RecordingOptions recording_options(const RunOptions& options, const lab::Se
   out.no_deskew = options.no_deskew;
   out.start = options.start;
   out.duration = options.duration;
-  out.drops = options.drops;
   return out;
 }
 
@@ -74,6 +73,7 @@ class Run {
         settings_(std::move(settings)),
         facts_(std::move(facts)),
         source_(options.input, recording_options(options, settings_, choice.used)),
+        failing_(source_, options.failures, source_.begin(), [this] { return source_.recorded(); }),
         estimator_(make_estimator(settings_, choice.used)),
         map_(settings_.mapping, options.threads > 1),
         files_(options.out),
@@ -86,6 +86,7 @@ class Run {
     progress_.finish();
     files_.close();
     facts_.failure = failure(interrupted);
+    for (const Sensor sensor : facts_.sensors) facts_.withheld[static_cast<std::size_t>(sensor)] = failing_.dropped(sensor);
     const lab::MapBuilder& map = map_.finish();
     if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map);
     facts_.map_points = map.size();
@@ -98,7 +99,8 @@ class Run {
  private:
   // True when the user stopped it.
   bool replay() {
-    ReadAhead input(source_, options_.threads > 1);
+    ReadAhead input(
+        failing_, [this] { return source_.progress(); }, options_.threads > 1);
     bool interrupted = false;
     while (auto measurement = input.next()) {
       keep(estimator_.push(*std::move(measurement)));
@@ -152,6 +154,7 @@ class Run {
   lab::Settings settings_;
   RunFacts facts_;
   lab::RecordingSource source_;
+  lab::FailingSource failing_;
   Estimator estimator_;
   MapKeeper map_;
   ResultFiles files_;

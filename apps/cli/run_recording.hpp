@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/recordings/recording_source.hpp"
+#include "lab/simulation/failures.hpp"
 
 namespace kilvo::cli {
 
@@ -17,7 +17,7 @@ struct RunOptions {
   std::optional<std::string> config;  // the shipped one of the G1 by default
   std::vector<std::string> overrides;
   std::optional<std::vector<Sensor>> sensors;
-  std::vector<lab::DropInterval> drops;
+  std::vector<lab::Failure> failures;
   double start = 0;                                           // s from the recording's beginning
   double duration = std::numeric_limits<double>::infinity();  // s
   std::optional<std::filesystem::path> map;                   // out/map.ply by default

@@ -76,11 +76,11 @@ std::vector<Sensor> parse_sensors(const std::string& list) {
   return {out.begin(), out.end()};
 }
 
-lab::DropInterval parse_drop(const std::string& text) {
+lab::Failure parse_drop(const std::string& text) {
   const UsageError wrong(fmt::format("--drop {}: must be SENSOR:T0-T1 in seconds, as in lidar:10-16, or lidar:10- (to the end)", text));
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos) throw wrong;
-  lab::DropInterval out;
+  lab::Failure out;
   out.sensor = parse_sensor(text.substr(0, colon));
   std::string_view rest = std::string_view(text).substr(colon + 1);
   const auto from = take_seconds(rest);

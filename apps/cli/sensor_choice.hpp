@@ -8,6 +8,7 @@
 
 #include "lab/recordings/recording_source.hpp"
 #include "lab/settings/settings.hpp"
+#include "lab/simulation/failures.hpp"
 
 namespace kilvo::cli {
 
@@ -20,7 +21,7 @@ constexpr bool is_supported(Sensor sensor) { return sensor != Sensor::camera; }
 std::vector<Sensor> parse_sensors(const std::string& list);
 
 /// "lidar:10-16", "lidar:10-" (to the end). Throws UsageError.
-lab::DropInterval parse_drop(const std::string& text);
+lab::Failure parse_drop(const std::string& text);
 
 struct SensorChoice {
   std::vector<Sensor> used;

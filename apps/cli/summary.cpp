@@ -35,6 +35,7 @@ Json messages_json(const RunFacts& facts, const lab::RecordingSource& source, co
     const SensorCount& estimator = statistics.sensors[static_cast<std::size_t>(sensor)];
     std::map<std::string, std::uint64_t> dropped = source.counts(sensor).dropped;
     for (const auto& [cause, n] : estimator.dropped) dropped[cause] += n;
+    if (const std::uint64_t n = facts.withheld[static_cast<std::size_t>(sensor)]; n > 0) dropped["drop_option"] = n;
     out[name_of(sensor)] = {{"topic", source.topic(sensor)}, {"used", estimator.used}, {"dropped", dropped}};
   }
   return out;

@@ -1,6 +1,7 @@
 // summary.json: the run in one file.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <string>
 #include <vector>
@@ -16,8 +17,9 @@ struct RunFacts {
   std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
   std::string input, config_file;
   std::vector<Sensor> sensors;
-  std::vector<std::string> notes, warnings;  // of the choice of sensors
-  std::string failure;                       // why the run failed; empty when it did not
+  std::vector<std::string> notes, warnings;            // of the choice of sensors
+  std::string failure;                                 // why the run failed; empty when it did not
+  std::array<std::uint64_t, sensor_count> withheld{};  // messages, by Sensor: what the user asked to drop
   double wall_seconds = 0;
   std::size_t map_points = 0;
 };

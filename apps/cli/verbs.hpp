@@ -17,5 +17,6 @@ void add_eval_contacts(CLI::App& program, Action& chosen);
 void add_report(CLI::App& program, Action& chosen);
 void add_config(CLI::App& program, Action& chosen);
 void add_demo(CLI::App& program, Action& chosen);
+void add_simulate(CLI::App& program, Action& chosen);
 
 }  // namespace kilvo::cli

@@ -42,7 +42,7 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   keep_finite();
   if (s.t - anchor_.t > longest_replay && pending_.empty()) settle(closed_);
   choose_modality(s.t);
-  if (!last_legs_) out.push_back(output_now());
+  if (!last_legs_) emit(out);
 }
 
 void Estimator::lose_legs(Time t) {
@@ -83,11 +83,7 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   const double after_us = watch.lap_us();
 
   choose_modality(s.t);
-  Output o = output_now();
-  o.contacts = contacts;
-  o.contact_us = contact_us;
-  o.kinematic_us = before_us + contact_us + after_us;
-  out.push_back(std::move(o));
+  emit(out, contacts, before_us + contact_us + after_us, contact_us);
 }
 
 }  // namespace kilvo

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-
 namespace kilvo {
 namespace {
 
@@ -79,7 +78,7 @@ std::vector<Output> Estimator::finish() {
     process_pending(held.t, out);
     if (sweep_ && estimate_->t < held.t) replay_.advance(*estimate_, held.t, trajectory_);
   }
-  if (sweep_) out.push_back(output_now());
+  if (sweep_) emit(out);
   for (std::size_t i = 0; i < pending_.size(); ++i) drop(Sensor::lidar, "no IMU");
   pending_.clear();
   for (const Measurement& m : before_start_) drop(sensor_of(m), "before the start");
@@ -122,7 +121,7 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   accel_scale_ = start.accel_scale;
   estimate_ = anchor_ = closed_ = start.estimate;
   last_sweep_ = start.estimate.t;
-  if (uses(Sensor::legs)) last_legs_ = start.estimate.t;  // until they turn out to be silent
+  if (uses(Sensor::legs)) last_legs_ = start.estimate.t;  // taken as there until they stay silent
   trajectory_.push(estimate_->t, estimate_->x.pose(), estimate_->x.v);
   if (!start.still) statistics_.warnings.push_back("the robot did not stand still: started on the move, with wide uncertainties");
   const double norm = start.resting_norm * start.accel_scale;
@@ -158,6 +157,17 @@ bool Estimator::keep_finite() {
   trajectory_.clear();
   trajectory_.push(t, estimate_->x.pose(), estimate_->x.v);
   return false;
+}
+
+// One output for each time: of two, the first has said it all.
+void Estimator::emit(std::vector<Output>& out, std::optional<Contacts> contacts, double kinematic_us, double contact_us) {
+  if (last_output_ && estimate_->t <= *last_output_) return;
+  last_output_ = estimate_->t;
+  Output o = output_now();
+  o.contacts = contacts;
+  o.kinematic_us = kinematic_us;
+  o.contact_us = contact_us;
+  out.push_back(std::move(o));
 }
 
 Output Estimator::output_now() {

@@ -47,6 +47,7 @@ class Estimator {
   bool uses(Sensor s) const { return used_[static_cast<std::size_t>(s)]; }
   bool keep_finite();
   Output output_now();  // with what a sweep left to go out
+  void emit(std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0, double contact_us = 0);
 
   // asynchronous.cpp: IMU and legs
   void handle_imu(ImuSample s, std::vector<Output>& out);
@@ -77,6 +78,7 @@ class Estimator {
   };
   std::deque<PendingScan> pending_;
   std::optional<Output> sweep_;  // a sweep's results, to go out with the next leg sample
+  std::optional<Time> last_output_;
   Trajectory trajectory_;
   VoxelMap map_;
   Workers workers_;

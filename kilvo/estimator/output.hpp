@@ -28,8 +28,8 @@ struct Output {
   State x;
   Covariance P = Covariance::Zero();  // of the error relative to the first pose (state.hpp: at)
   Modality modality = Modality::coast;
-  const char* cause = "start";  // of the last change of modality
-  bool is_sweep = false;  // state after the last update of a sweep
+  const char* cause = "start";       // of the last change of modality
+  bool is_sweep = false;             // state after the last update of a sweep
   std::optional<Contacts> contacts;  // of each leg sample
   double kinematic_us = 0;           // of a leg sample: kinematics, contacts, prediction and update
   double contact_us = 0;             // the contacts' part of it

@@ -84,7 +84,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   statistics_.diverged = statistics_.diverged || estimate_->x.v.norm() > absurd_speed;
   last_sweep_ = end;
   choose_modality(end);
-  if (sweep_) out.push_back(output_now());  // two sweeps within one leg sample
+  if (sweep_) emit(out);  // two sweeps within one leg sample
   sweep_.emplace();
   sweep_->is_sweep = true;
   sweep_->registration = model.report();
@@ -92,7 +92,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   sweep_->stages = stages;
   sweep_->stages.other_us = watch.lap_us();
   // While the legs are used it goes out with the next of their samples, which is not earlier than those that have gone.
-  if (!last_legs_) out.push_back(output_now());
+  if (!last_legs_) emit(out);
 }
 
 }  // namespace kilvo

@@ -49,7 +49,7 @@ class Timeline {
   std::optional<Time> released_, newest_of_all_;
   // By completion; of the same time the IMU first; then by arrival.
   std::map<std::tuple<Time, Sensor, std::uint64_t>, Measurement> waiting_;
-  std::vector<Measurement> suspects_;                              // ahead of all others
+  std::vector<Measurement> suspects_;  // ahead of all others
   std::vector<Sensor> jumped_;
   std::uint64_t sequence_ = 0;
   Duration max_wait_;

@@ -206,7 +206,7 @@ TEST(Predict, AFootThatDoesNotStandGetsNoNoise) {
   const ImuInterval interval = ImuInterval::hold({e.t, {0, 0, 0}, {0, 0, 9.8}}, e.t, e.t + from_seconds(0.1));
   const Covariance P = predict(e, interval, {std::nullopt, SO3()}, {}).P;
   EXPECT_EQ(P(at::pcl, at::pcl), 0);
-  EXPECT_NEAR(P(at::pcr, at::pcr), 0.01 * 0.01 * 0.1, 1e-12);
+  EXPECT_NEAR(P(at::pcr, at::pcr), ProcessNoise{}.foot * ProcessNoise{}.foot * 0.1, 1e-12);
 }
 
 TEST(ImuInterval, BetweenTwoSamplesIsThePieceOfTheStraightLine) {

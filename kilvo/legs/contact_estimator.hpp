@@ -23,10 +23,10 @@ struct Contacts {
 
 /// A sole's slowest corner and its lowest point, in the world.
 struct FootMotion {
-  double slowest = 0;                                    // speed of the slowest corner, m/s
-  double speed = 0;                                      // of the lowest point, m/s
-  double vertical = 0;                                   // its upward velocity, m/s
-  Eigen::Vector3d lowest_W = Eigen::Vector3d::Zero();    // the lowest point, m
+  double slowest = 0;                                  // speed of the slowest corner, m/s
+  double speed = 0;                                    // of the lowest point, m/s
+  double vertical = 0;                                 // its upward velocity, m/s
+  Eigen::Vector3d lowest_W = Eigen::Vector3d::Zero();  // the lowest point, m
 };
 FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d& omega);
 
@@ -55,10 +55,10 @@ class ContactEstimator {
   struct FootState {
     std::array<Sample, history> samples{};
     std::size_t count = 0;
-    Time since{};                // of the present phase
-    double peak = 0;             // speed in this swing, held for two samples
+    Time since{};                              // of the present phase
+    double peak = 0;                           // speed in this swing, held for two samples
     std::optional<Time> moving, impact, slow;  // since when the cue has been there
-    double ground_z = 0;         // height of the last place it stood on
+    double ground_z = 0;                       // height of the last place it stood on
   };
   void start(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion);
   bool lifts(FootState& f, const FootMotion& m, Time t) const;
@@ -71,7 +71,7 @@ class ContactEstimator {
   Contacts contacts_;
   bool started_ = false;
   double swing_speed_ = 0, first_guess_ = 0;  // m/s
-  int slow_swings_ = 0;  // in a row
+  int slow_swings_ = 0;                       // in a row
   Duration period_{};
   std::array<FootState, 2> foot_;
   Eigen::Vector3d accel_mean_ = Eigen::Vector3d::Zero(), accel_variance_ = Eigen::Vector3d::Zero();

@@ -8,15 +8,15 @@
 namespace kilvo {
 
 struct LegConfig {
-  double lift_off_speed = 0.1;       // share of the robot's swing speed
-  double touchdown_speed = 0.06;     // share of the robot's swing speed
-  double impact_drop = 0.62;         // share of the speed before
-  double settling = 0.1;             // s
-  double velocity_sigma = 0.01;      // m/s
-  double velocity_correlation = 0.005;  // s
-  double position_sigma = 0.001;     // m
-  double position_correlation = 0.02;  // s
-  double entry_delay = 0.015;        // s
+  double lift_off_speed = 0.1;        // share of the robot's swing speed
+  double touchdown_speed = 0.06;      // share of the robot's swing speed
+  double impact_drop = 0.62;          // share of the speed before
+  double settling = 0.1;              // s
+  double velocity_sigma = 0.01;       // m/s
+  double velocity_correlation = 0.2;  // s
+  double position_sigma = 0.001;      // m
+  double position_correlation = 0.5;  // s
+  double entry_delay = 0.015;         // s
   double gate = 5.0;
 
   static constexpr auto fields() {

@@ -143,8 +143,8 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
     // Eq. 8: what moves is believed less; so is what has just arrived.
     const double moving2 = (x.v + x.R * (omega.cross(foot.point.p) + foot.point.v)).squaredNorm();
     const double entering = std::max(0.0, 1.0 - (phase - config_.entry_delay) / entry_time);
-    foot.looseness = std::clamp(1.0 + moving2 / (config_.velocity_sigma * config_.velocity_sigma) + (loosest - 1) * entering, 1.0,
-                                loosest * loosest);
+    foot.looseness =
+        std::clamp(1.0 + moving2 / (config_.velocity_sigma * config_.velocity_sigma) + (loosest - 1) * entering, 1.0, loosest * loosest);
   }
   return out;
 }

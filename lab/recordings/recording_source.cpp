@@ -64,18 +64,8 @@ RecordingSource::RecordingSource(const std::filesystem::path& input, RecordingOp
   reader_.select(is_chosen, from, from == Time::max() ? from : after(from, options_.duration));
 }
 
-bool RecordingSource::is_dropped(Sensor sensor, Time recorded) const {
-  return std::ranges::any_of(options_.drops, [&](const DropInterval& drop) {
-    return drop.sensor == sensor && recorded >= after(begin(), drop.from) && recorded < after(begin(), drop.until);
-  });
-}
-
 std::optional<Measurement> RecordingSource::decode(Sensor sensor, const RawMessage& message) {
   SensorCounts& counts = counts_[static_cast<std::size_t>(sensor)];
-  if (is_dropped(sensor, message.time)) {
-    ++counts.dropped["drop_option"];
-    return std::nullopt;
-  }
   if (message.size > most_message_bytes) {
     ++counts.dropped["too_large"];
     return std::nullopt;

@@ -24,19 +24,11 @@ struct SensorInput {
   double time_offset = 0;  // s, added to the stamps (of a scan: to the time that its points count from)
 };
 
-/// Messages of a sensor recorded in [from, until) seconds after the beginning of the recording are withheld.
-struct DropInterval {
-  Sensor sensor{};
-  double from = 0;
-  double until = std::numeric_limits<double>::infinity();
-};
-
 struct RecordingOptions {
   std::array<SensorInput, sensor_count> sensors;
   bool no_deskew = false;                                     // take every cloud at its stamp; needs no point times
   double start = 0;                                           // s from the beginning of the recording
   double duration = std::numeric_limits<double>::infinity();  // s
-  std::vector<DropInterval> drops;
 
   SensorInput& operator[](Sensor s) { return sensors[static_cast<std::size_t>(s)]; }
   const SensorInput& operator[](Sensor s) const { return sensors[static_cast<std::size_t>(s)]; }
@@ -45,7 +37,7 @@ struct RecordingOptions {
 /// What became of the messages of one sensor within [start, start + duration).
 struct SensorCounts {
   std::uint64_t used = 0;
-  std::map<std::string, std::uint64_t> dropped;  // cause -> messages: "drop_option", "undecodable", "too_large"
+  std::map<std::string, std::uint64_t> dropped;  // cause -> messages: "undecodable", "too_large"
   std::uint64_t absurd_point_times = 0;          // points, not messages: dropped from their clouds
   std::uint64_t unstamped = 0;                   // used, with the time of their recording because their stamp is 0
 };
@@ -77,7 +69,6 @@ class RecordingSource final : public MeasurementSource {
   std::vector<std::string> warnings() const;
 
  private:
-  bool is_dropped(Sensor sensor, Time recorded) const;
   std::optional<Measurement> decode(Sensor sensor, const RawMessage& message);
 
   Rosbag1Reader reader_;

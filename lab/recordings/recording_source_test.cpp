@@ -88,24 +88,6 @@ TEST(RecordingSource, StartAndDurationCutAPartOut) {
   EXPECT_TRUE(source.counts(Sensor::imu).dropped.empty()) << "what was not asked for is not dropped";
 }
 
-TEST(RecordingSource, DropsWhatItWasAskedToAndCountsIt) {
-  const TemporaryFolder folder;
-  write_bag(folder / "walk.bag", tiny_walk());
-  auto options = use({Sensor::imu, Sensor::legs});
-  options.drops = {{Sensor::imu, 0.1, 0.2}, {Sensor::legs, 0.4}};
-  RecordingSource source(folder / "walk.bag", options);
-  for (const auto& m : drain(source)) {
-    const auto since = stamp_of(m) - tiny_begin;
-    const bool imu = sensor_of(m) == Sensor::imu;
-    const Duration from = std::chrono::milliseconds(imu ? 100 : 400), until = std::chrono::milliseconds(imu ? 200 : 9999);
-    EXPECT_TRUE(since < from || since >= until) << name_of(sensor_of(m)) << " at " << to_seconds(since);
-  }
-  EXPECT_EQ(source.counts(Sensor::imu).used, 40U);
-  EXPECT_EQ(source.counts(Sensor::imu).dropped, (std::map<std::string, std::uint64_t>{{"drop_option", 10}}));
-  EXPECT_EQ(source.counts(Sensor::legs).used, 80U);
-  EXPECT_EQ(source.counts(Sensor::legs).dropped, (std::map<std::string, std::uint64_t>{{"drop_option", 20}}));
-}
-
 TEST(RecordingSource, TimeOffsetsMoveTheStamps) {
   const TemporaryFolder folder;
   write_bag(folder / "walk.bag", tiny_walk());

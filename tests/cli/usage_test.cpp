@@ -47,7 +47,6 @@ TEST(Usage, MissingOrImpossibleWordsAreSaid) {
 TEST(Usage, SensorsThatCannotBeUsedAreRefused) {
   const TemporaryFolder folder;
   expect_error({"run", "x.bag", "--out", folder / "out", "--sensors", "lidar"}, 2, "the imu is needed");
-  expect_error({"run", "x.bag", "--out", folder / "out", "--sensors", "imu,legs"}, 2, "the sensor 'legs' is not supported by this version");
   expect_error({"run", "x.bag", "--out", folder / "out", "--sensors", "camera,imu,lidar"}, 2, "the sensor 'camera' is not supported");
   write_text(folder / "robot.yaml", "imu: {topic: /imu}");
   expect_error({"run", "x.bag", "--out", folder / "out", "--config", folder / "robot.yaml", "--sensors", "imu,lidar"}, 2,

@@ -1,0 +1,33 @@
+// kilvo simulate SCENARIO --out DIR: a walk with all sensors and the truth, written as a recording.
+#include <fmt/core.h>
+#include <memory>
+
+#include "apps/cli/exit_code.hpp"
+#include "apps/cli/simulation_folder.hpp"
+#include "apps/cli/verbs.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+int simulate(const std::string& out, const SimulationOptions& options) {
+  const double seconds = simulate_into(out, options);
+  if (!options.quiet) fmt::print("{}: {:.1f} s of '{}', seed {}\n", out, seconds, options.scenario, options.seed);
+  return done;
+}
+
+}  // namespace
+
+void add_simulate(CLI::App& program, Action& chosen) {
+  auto out = std::make_shared<std::string>();
+  auto options = std::make_shared<SimulationOptions>();
+  CLI::App* verb = program.add_subcommand("simulate", "walk a simulated humanoid and record its sensors, with the truth");
+  verb->add_option("SCENARIO", options->scenario, "which walk, see below")->required();
+  verb->add_option("--out", *out, "folder for the recording and the truth, created if need be")->type_name("DIR")->required();
+  verb->add_option("--seed", options->seed, "of furniture, textures and noise; default: 1")->type_name("N");
+  verb->add_option("--duration", options->duration, "end after so many seconds; default: when the walk ends")->type_name("S");
+  verb->add_flag("--quiet", options->quiet, "no progress, only errors");
+  verb->footer(list_of_scenarios());
+  verb->callback([out, options, &chosen] { chosen = [out, options] { return simulate(*out, *options); }; });
+}
+
+}  // namespace kilvo::cli

@@ -1,0 +1,113 @@
+#include "apps/cli/simulation_folder.hpp"
+
+#include <fmt/core.h>
+
+#include "apps/cli/csv_file.hpp"
+#include "apps/cli/exit_code.hpp"
+#include "apps/cli/output_folder.hpp"
+#include "apps/cli/progress.hpp"
+#include "lab/evaluation/decimal_time.hpp"
+#include "lab/evaluation/trajectory_file.hpp"
+#include "lab/recordings/recording_writer.hpp"
+#include "lab/settings/nearest.hpp"
+#include "lab/simulation/description.hpp"
+#include "lab/simulation/simulator.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double truth_rate = 1000;  // Hz
+constexpr double longest = 3600;     // s
+
+const lab::Scenario& find_scenario(const std::string& name) {
+  std::vector<std::string> names;
+  for (const lab::Scenario& s : lab::scenarios()) {
+    if (s.name == name) return s;
+    names.push_back(s.name);
+  }
+  throw UsageError(fmt::format("no scenario '{}', nearest is '{}' (kilvo simulate --help lists them)", name, lab::nearest(name, names)));
+}
+
+std::string seconds(Time t) {
+  std::string out;
+  lab::append_seconds(out, t);
+  return out;
+}
+
+/// Pose and contacts at every millisecond.
+void write_walk(const fs::path& folder, const lab::Simulator& simulator) {
+  lab::TumWriter poses(folder / "gt.tum");
+  CsvFile contacts(folder / "contacts.gt.csv", "t,left,right");
+  const lab::Walk& walk = simulator.walk();
+  for (std::int64_t i = 0; static_cast<double>(i) <= simulator.duration() * truth_rate; ++i) {
+    const double s = static_cast<double>(i) / truth_rate;
+    const Time t = simulator.start() + from_seconds(s);
+    poses.write({t, walk.imu(s)});
+    contacts.write(fmt::format("{},{:d},{:d}", seconds(t), walk.in_contact(lab::Side::left, s), walk.in_contact(lab::Side::right, s)));
+  }
+  poses.close();
+  contacts.close();
+}
+
+std::string numbers(std::initializer_list<Eigen::Vector3d> vectors) {
+  std::string out;
+  for (const Eigen::Vector3d& v : vectors) out += fmt::format(",{:.9g},{:.9g},{:.9g}", v.x(), v.y(), v.z());
+  return out;
+}
+
+void write_recording(const fs::path& folder, lab::Simulator& simulator, Progress& progress) {
+  lab::RecordingWriter recording(folder / "recording.bag", lab::simulated_topics());
+  CsvFile imu(folder / "imu_truth.csv", "t,gx,gy,gz,ax,ay,az,bgx,bgy,bgz,bax,bay,baz,vx,vy,vz");
+  CsvFile exposure(folder / "exposure.csv", "t,exposure_ms,gain");
+  while (const auto measurement = simulator.next()) {
+    recording.write(*measurement, simulator.arrived());
+    if (sensor_of(*measurement) == Sensor::imu) {
+      const lab::ImuTruth& truth = simulator.imu_truth();
+      imu.write(seconds(truth.t) + numbers({truth.gyro, truth.accel, truth.gyro_bias, truth.accel_bias, truth.velocity}));
+    } else if (sensor_of(*measurement) == Sensor::camera) {
+      const lab::CameraModel& camera = simulator.config().camera;
+      const Time t = simulator.measured();
+      exposure.write(fmt::format("{},{:.6f},{:.6g}", seconds(t), 1e3 * lab::exposure_at(camera, simulator.seconds_of(t)), camera.gain));
+    }
+    progress.update(simulator.seconds_of(simulator.arrived()) / simulator.duration(), [] { return std::string("simulating"); });
+  }
+  recording.close();
+  imu.close();
+  exposure.close();
+}
+
+}  // namespace
+
+std::string list_of_scenarios() {
+  std::string out = "Scenarios:\n";
+  for (const lab::Scenario& s : lab::scenarios()) out += fmt::format("  {:<12} {}\n", s.name, s.sentence);
+  return out + "Each begins with 3 s of standing still. The same scenario and seed give the same bytes.";
+}
+
+double simulate_into(const fs::path& folder, const SimulationOptions& options) {
+  const lab::Scenario& scenario = find_scenario(options.scenario);
+  if (options.duration && !(*options.duration > 0 && *options.duration <= longest)) {
+    throw UsageError(fmt::format("--duration must be above 0 and at most {} seconds", longest));
+  }
+  if (options.seed < 0) throw UsageError("--seed must be 0 or more");
+  lab::SimulatorConfig config;
+  config.seed = static_cast<std::uint64_t>(options.seed);
+  config.duration = options.duration.value_or(0);
+  config.threads = 0;
+  try {
+    lab::Simulator simulator(scenario, config);
+    prepare_folder(folder);
+    Progress progress(Progress::style_for(options.quiet));
+    write_text_file(folder / "robot.urdf", lab::urdf_of(config.shape));
+    write_text_file(folder / "config.yaml", lab::simulated_config(config, "robot.urdf"));
+    write_walk(folder, simulator);
+    write_recording(folder, simulator, progress);
+    return simulator.duration();
+  } catch (const lab::PlanError& error) {
+    throw UsageError(fmt::format("{}: {}", scenario.name, error.what()));
+  }
+}
+
+}  // namespace kilvo::cli

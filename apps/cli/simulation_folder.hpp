@@ -1,0 +1,25 @@
+// A simulated walk, written as a recording with its truth.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace kilvo::cli {
+
+struct SimulationOptions {
+  std::string scenario;            // by name; `kilvo simulate --help` lists them
+  std::int64_t seed = 1;           // of furniture, textures and noise
+  std::optional<double> duration;  // s; until the walk ends by default
+  bool quiet = false;              // no progress
+};
+
+/// Writes recording.bag, gt.tum, contacts.gt.csv, imu_truth.csv, exposure.csv, robot.urdf and config.yaml into `folder`. Returns the
+/// seconds simulated. Throws UsageError for options that make no sense, lab::OutputError when the folder cannot be written.
+double simulate_into(const std::filesystem::path& folder, const SimulationOptions& options);
+
+/// One line for each scenario.
+std::string list_of_scenarios();
+
+}  // namespace kilvo::cli

@@ -1,0 +1,155 @@
+#include "lab/simulation/failures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+// Seconds beyond which a time means "for ever".
+constexpr double for_ever = 1e9;
+
+Time after(Time begin, double seconds) { return seconds < for_ever ? begin + from_seconds(seconds) : Time::max(); }
+
+Time& stamp_in(Measurement& measurement) {
+  return std::visit([](auto& m) -> Time& { return m.t; }, measurement);
+}
+
+void make_nan(Measurement& measurement) {
+  if (auto* imu = std::get_if<ImuSample>(&measurement)) {
+    imu->gyro.setConstant(nan);
+    imu->accel.setConstant(nan);
+  } else if (auto* joints = std::get_if<JointSample>(&measurement)) {
+    std::ranges::fill(joints->position, nan);
+    std::ranges::fill(joints->velocity, nan);
+  } else if (auto* scan = std::get_if<LidarScan>(&measurement)) {
+    for (std::size_t i = 0; i < scan->points.size(); i += 2) scan->points[i].x = std::numeric_limits<float>::quiet_NaN();
+  }
+}
+
+void add_noise(Measurement& measurement, double sigma, Random& random) {
+  if (auto* imu = std::get_if<ImuSample>(&measurement)) {
+    imu->gyro += sigma * random.gaussian3();
+    imu->accel += sigma * random.gaussian3();
+  } else if (auto* joints = std::get_if<JointSample>(&measurement)) {
+    for (double& q : joints->position) q += sigma * random.gaussian();
+  } else if (auto* scan = std::get_if<LidarScan>(&measurement)) {
+    for (LidarPoint& p : scan->points) {
+      for (float* x : {&p.x, &p.y, &p.z}) *x += static_cast<float>(sigma * random.gaussian());
+    }
+  } else if (auto* camera = std::get_if<CameraImage>(&measurement)) {
+    for (std::uint8_t& grey : camera->image.pixels) {
+      grey = static_cast<std::uint8_t>(std::clamp(std::lround(grey + sigma * random.gaussian()), 0L, 255L));
+    }
+  }
+}
+
+void darken(Measurement& measurement, double factor) {
+  auto* camera = std::get_if<CameraImage>(&measurement);
+  if (camera == nullptr) return;
+  for (std::uint8_t& grey : camera->image.pixels) grey = static_cast<std::uint8_t>(std::clamp(std::lround(grey * factor), 0L, 255L));
+}
+
+void narrow(Measurement& measurement, double sector) {
+  auto* scan = std::get_if<LidarScan>(&measurement);
+  if (scan != nullptr) std::erase_if(scan->points, [&](const LidarPoint& p) { return std::abs(std::atan2(p.y, p.x)) > sector / 2; });
+}
+
+void wipe(Measurement& measurement) {
+  auto* camera = std::get_if<CameraImage>(&measurement);
+  if (camera == nullptr || camera->image.empty()) return;
+  auto& pixels = camera->image.pixels;
+  const std::uint64_t sum = std::accumulate(pixels.begin(), pixels.end(), std::uint64_t{0});
+  std::ranges::fill(pixels, static_cast<std::uint8_t>(sum / pixels.size()));
+}
+
+// The content of `before` at the time of `measurement`.
+void freeze(Measurement& measurement, const std::optional<Measurement>& before) {
+  if (!before) return;
+  const Time t = stamp_of(measurement);
+  measurement = *before;
+  stamp_in(measurement) = t;
+}
+
+}  // namespace
+
+FailingSource::FailingSource(MeasurementSource& source, std::vector<Failure> failures, Time begin, std::function<Time()> arrival,
+                             std::uint64_t seed)
+    : source_(source), failures_(std::move(failures)), begin_(begin), arrival_(std::move(arrival)), random_(seed) {}
+
+bool FailingSource::is_on(const Failure& failure, Sensor sensor, Time arrived) const {
+  return failure.sensor == sensor && arrived >= after(begin_, failure.from) && arrived < after(begin_, failure.until);
+}
+
+void FailingSource::spoil(const Failure& failure, Measurement& measurement) {
+  switch (failure.kind) {
+    case FailureKind::freeze:
+      return freeze(measurement, before_[measurement.index()]);
+    case FailureKind::not_a_number:
+      return make_nan(measurement);
+    case FailureKind::noise:
+      return add_noise(measurement, failure.amount, random_);
+    case FailureKind::time_jump:
+      stamp_in(measurement) += from_seconds(failure.amount);
+      return;
+    case FailureKind::darkness:
+      return darken(measurement, failure.amount);
+    case FailureKind::narrow_sector:
+      return narrow(measurement, failure.amount);
+    case FailureKind::textureless:
+      return wipe(measurement);
+    case FailureKind::drop:
+    case FailureKind::delay:
+    case FailureKind::duplicate:
+      return;  // not of the content
+  }
+}
+
+void FailingSource::take(Measurement measurement, Time arrived) {
+  const Sensor sensor = sensor_of(measurement);
+  double delay = 0;
+  bool twice = false, frozen = false;
+  for (const Failure& failure : failures_) {
+    if (!is_on(failure, sensor, arrived)) continue;
+    if (failure.kind == FailureKind::drop) {
+      ++dropped_[static_cast<std::size_t>(sensor)];
+      return;
+    }
+    if (failure.kind == FailureKind::delay) delay += failure.amount;
+    twice = twice || failure.kind == FailureKind::duplicate;
+    frozen = frozen || failure.kind == FailureKind::freeze;
+  }
+  const bool remember =
+      !frozen && std::ranges::any_of(failures_, [&](const Failure& f) { return f.kind == FailureKind::freeze && f.sensor == sensor; });
+  if (remember) before_[measurement.index()] = measurement;
+  for (const Failure& failure : failures_) {
+    if (is_on(failure, sensor, arrived)) spoil(failure, measurement);
+  }
+  for (int i = 0; i < (twice ? 2 : 1); ++i) {
+    if (delay > 0) {
+      held_.emplace(arrived + from_seconds(delay), measurement);
+    } else {
+      ready_.push_back(measurement);
+    }
+  }
+}
+
+std::optional<Measurement> FailingSource::next() {
+  if (failures_.empty()) return source_.next();
+  while (ready_.empty()) {
+    auto measurement = source_.next();
+    const Time now = !measurement ? Time::max() : arrival_ ? arrival_() : stamp_of(*measurement);
+    const auto due = held_.upper_bound(now);
+    for (auto it = held_.begin(); it != due; ++it) ready_.push_back(std::move(it->second));
+    held_.erase(held_.begin(), due);
+    if (!measurement && ready_.empty()) return std::nullopt;
+    if (measurement) take(*std::move(measurement), now);
+  }
+  Measurement out = std::move(ready_.front());
+  ready_.pop_front();
+  return out;
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,100 @@
+#include "lab/simulation/lidar_sensor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "lab/simulation/random.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double degree = pi / 180;
+constexpr std::uint64_t stream = 31;
+
+Eigen::Vector3d from_angles(double azimuth, double elevation) {
+  return {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation)};
+}
+
+// Does the ray pass a line segment from a to b nearer than `radius`?
+bool hits_capsule(const Eigen::Vector3d& o, const Eigen::Vector3d& d, const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius) {
+  const Eigen::Vector3d axis = b - a, w = o - a;
+  const double k = axis.squaredNorm(), m = d.dot(axis), n = w.dot(axis), l = w.dot(d);
+  const double denominator = k - m * m;
+  // Nearest points of the two lines, then kept on the segment and before the sensor.
+  const double s = std::clamp(denominator > 1e-12 ? (n - m * l) / denominator : 0.0, 0.0, 1.0);
+  const double t = std::max(0.0, s * m - l);
+  return (w + t * d - s * axis).squaredNorm() < radius * radius;
+}
+
+struct NoSum {
+  NoSum& operator+=(const NoSum&) { return *this; }
+};
+
+}  // namespace
+
+Eigen::Vector3d ray_direction(const LidarModel& model, int i, double t, double phase) {
+  if (model.scan == LidarModel::Scan::rosette) {
+    // Turns a little more than once a scan while the elevation sweeps -7 to 52 degrees; neither divides the other, so no scan repeats.
+    const double azimuth = phase + 2 * pi * 10.197 * t, sweep = 1637.31 * t + 0.25 * (i % 4);
+    const double triangle = std::abs(2 * (sweep - std::floor(sweep)) - 1);
+    return from_angles(azimuth, (-7 + 59 * triangle) * degree);
+  }
+  const int lines = model.scan == LidarModel::Scan::lines_16 ? 16 : 64;
+  const double span = model.scan == LidarModel::Scan::lines_16 ? 30 : 45;
+  const int columns = model.points / lines;
+  const int column = i / lines;
+  const double azimuth = phase - 2 * pi * column / std::max(columns, 1);
+  return from_angles(azimuth, (-span / 2 + span * (i % lines) / (lines - 1)) * degree);
+}
+
+bool hits_own_body(const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
+  if (hits_capsule(o, d, {0, 0, 0}, {0, 0, 0.24}, 0.12)) return true;
+  for (const double y : {-1.0, 1.0}) {
+    if (hits_capsule(o, d, {0, 0.19 * y, 0.24}, {0.02, 0.22 * y, -0.05}, 0.05)) return true;
+    if (hits_capsule(o, d, {0.02, 0.22 * y, -0.05}, {0.2, 0.2 * y, -0.1}, 0.04)) return true;
+  }
+  return false;
+}
+
+LidarSensor::LidarSensor(const SimulatorConfig& config, const World& world, double range_limit)
+    : config_(config),
+      world_(world),
+      max_range_(range_limit > 0 ? std::min(range_limit, config.lidar.max_range) : config.lidar.max_range),
+      phase_(Random(config.seed, stream).uniform(0, 2 * pi)) {}
+
+LidarScan LidarSensor::scan(std::int64_t index, double begin, const std::function<SE3(double)>& torso_at, const Workers& workers) const {
+  const LidarModel& model = config_.lidar;
+  const double interval = 1 / model.delivery.rate / model.points;
+  std::vector<LidarPoint> points(static_cast<std::size_t>(model.points));  // at the origin: no echo
+  const SE3& T_TL = config_.shape.T_torso_lidar;
+  const auto cast = [&](std::size_t i) {
+    const double offset = interval * static_cast<double>(i), t = begin + offset;
+    const Eigen::Vector3d direction = ray_direction(model, static_cast<int>(i), t, phase_);
+    if (hits_own_body(T_TL.p, T_TL.R * direction)) return;
+    const SE3 T_WL = torso_at(t) * T_TL;
+    const auto hit = world_.cast(T_WL.p, T_WL.R * direction);
+    if (!hit || hit->cosine < model.least_cosine || hit->range < model.min_range) return;
+    // The echo of a darker or grazed surface is lost earlier: its power falls with the square of the range.
+    if (hit->range > max_range_ * std::min(1.0, std::sqrt(world_.reflectivity(*hit) * hit->cosine / 0.1))) return;
+    Random random(config_.seed, stream + 1, static_cast<std::uint64_t>(index) * 1'000'003 + i);
+    const double range = hit->range + model.range_noise * random.gaussian();
+    const Eigen::Vector3d tilt = model.angle_noise * random.gaussian3();
+    const Eigen::Vector3f p = (range * (direction + tilt - tilt.dot(direction) * direction).normalized()).cast<float>();
+    const auto intensity = static_cast<float>(255 * world_.reflectivity(*hit) * std::sqrt(hit->cosine));
+    points[i] = {p.x(), p.y(), p.z(), std::round(intensity), static_cast<std::int32_t>(std::llround(offset * 1e9))};
+  };
+  workers.sum(points.size(), 500, NoSum{}, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) cast(i);
+    return NoSum{};
+  });
+  LidarScan out;
+  out.points.reserve(points.size());
+  for (const LidarPoint& p : points) {
+    if (p.x != 0 || p.y != 0 || p.z != 0) out.points.push_back(p);
+  }
+  return out;
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,156 @@
+#include "lab/simulation/scenarios.hpp"
+
+#include <numbers>
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double quarter = std::numbers::pi / 2;
+// The robot stands 3 s; the last 0.4 s before the first step the pelvis begins to move.
+constexpr double first_stand = 3.4;
+
+Stage stand(double seconds) { return {.stand = seconds}; }
+Stage ahead(int steps, double length, Gait gait = {}) {
+  gait.forward = length;
+  return {.steps = steps, .gait = gait};
+}
+Stage aside(int steps, double length, Gait gait = {}) {
+  gait.left = length;
+  return {.steps = steps, .gait = gait};
+}
+// A turn by `angle` while going forward.
+Stage turn(int steps, double angle, double length = 0, Gait gait = {}) {
+  gait.turn = angle / steps;
+  return ahead(steps, length, gait);
+}
+
+Gait fast() {
+  return {.period = 0.42,
+          .double_support = 0.06,
+          .lift = 0.07,
+          .hip_height = 0.54,
+          .sway = 0.02,
+          .bob = 0.015,
+          .twist = 0.08,
+          .lean = 0.06,
+          .impact = 8};
+}
+Gait running() {
+  return {.period = 0.36,
+          .double_support = -0.08,
+          .lift = 0.09,
+          .hip_height = 0.53,
+          .sway = 0.012,
+          .bob = -0.028,
+          .roll = 0.015,
+          .pitch = 0.01,
+          .twist = 0.1,
+          .lean = 0.1,
+          .impact = 12};
+}
+Gait climbing() {
+  return {.period = 0.7,
+          .double_support = 0.16,
+          .lift = 0.045,
+          .hip_height = 0.515,
+          .sway = 0.03,
+          .bob = 0.006,
+          .lean = 0.06,
+          .impact = 5,
+          .toe_off = 0.35};
+}
+Gait descending() {
+  Gait gait = climbing();
+  gait.hip_height = 0.49;
+  return gait;
+}
+Gait rolling() { return {.hip_height = 0.54, .heel_strike = 0.18, .toe_off = 0.3}; }
+Gait slipping() { return {.slip = 0.03}; }
+Gait sinking() { return {.impact = 2, .sink = 0.012, .creep = 0.003}; }
+
+// Steps and quarter turns about a rectangle.
+std::vector<Stage> square(int rounds, const Gait& gait, double length) {
+  std::vector<Stage> out{stand(first_stand)};
+  for (int i = 0; i < 2 * rounds; ++i) {
+    out.push_back(ahead(8, length, gait));
+    out.push_back(turn(6, quarter, 0.1, gait));
+    out.push_back(ahead(5, length, gait));
+    out.push_back(turn(6, quarter, 0.1, gait));
+  }
+  out.push_back(stand(1));
+  return out;
+}
+
+const Place room_corner{-2.2, -1.3, 0};
+
+std::vector<Scenario> of_the_room() {
+  const Stage still = stand(first_stand), rest = stand(1);
+  return {
+      {"room", "forward and turning through a furnished room, 30 s", "room", room_corner, square(1, {.forward = 0}, 0.27)},
+      {"stand", "standing still", "room", room_corner, {stand(20)}},
+      {"in_place", "stepping on the spot", "room", {-0.5, 0, 0}, {still, ahead(30, 0), rest}},
+      {"forward", "straight ahead", "room", {-3.4, 0.3, 0}, {still, ahead(24, 0.26), rest}},
+      {"backward", "straight back", "room", {2.8, 0.3, 0}, {still, ahead(26, -0.2), rest}},
+      {"sideways", "to the left and back to the right", "room", {0, -2, 0}, {still, aside(20, 0.1), stand(0.5), aside(20, -0.1), rest}},
+      {"spin",
+       "turning on the spot, one turn each way",
+       "room",
+       {-0.5, 0, 0},
+       {still, turn(24, 4 * quarter), stand(0.5), turn(24, -4 * quarter), rest}},
+      {"square", "two rounds of a rectangle", "room", room_corner, square(2, {}, 0.27)},
+      {"fast_walk", "long quick steps round a room", "room", room_corner, square(2, fast(), 0.32)},
+      {"rolling", "soles that come down on the heel and leave over the toe", "room", room_corner, square(1, rolling(), 0.3)},
+      {"slip", "the left foot slides 3 cm in every stance", "room", room_corner, square(1, slipping(), 0.24)},
+      {"soft", "a floor into which the feet sink and on which they creep", "room", room_corner, square(1, sinking(), 0.25)},
+  };
+}
+
+std::vector<Scenario> of_elsewhere() {
+  const Stage still = stand(first_stand), rest = stand(1);
+  const Stage about = turn(12, 2 * quarter);
+  std::vector<Scenario> out{
+      {"corridor",
+       "40 m of corridor, without LiDAR information along it in the middle",
+       "corridor",
+       {0, 0, 0},
+       {still, ahead(110, 0.32, fast()), rest},
+       9},
+      {"blank_wall",
+       "up to a wall without texture, along it, and back",
+       "blank_wall",
+       {1.2, -1, 0},
+       {still, ahead(12, 0.25), stand(0.5), aside(20, 0.1), stand(0.5), ahead(12, -0.2), rest}},
+      {"yard",
+       "over a ramp, round, back, and over boards",
+       "yard",
+       {-1, 0.6, 0},
+       {still, ahead(44, 0.27, {.hip_height = 0.53}), about, ahead(40, 0.27, {.hip_height = 0.53}), turn(8, quarter),
+        ahead(9, 0.2, {.hip_height = 0.54}), turn(8, quarter), ahead(8, 0.2, {.hip_height = 0.54}), rest}},
+      {"slope", "up a ramp and down its other side", "yard", {0.4, 0, 0}, {still, ahead(38, 0.27, {.hip_height = 0.53}), rest}},
+      {"run",
+       "running over grass, with both feet in the air between steps",
+       "yard",
+       {-14, -4.5, 0},
+       {still, ahead(4, 0.3, fast()), ahead(36, 0.44, running()), ahead(4, 0.2, fast()), rest}},
+      {"stairs",
+       "six stairs up, a turn, and down again",
+       "stairs",
+       {-0.02, 0, 0},
+       {still, ahead(3, 0.28, climbing()), ahead(11, 0.28, climbing()), turn(14, 2 * quarter, 0, climbing()), ahead(14, 0.28, descending()),
+        rest}},
+  };
+  return out;
+}
+
+}  // namespace
+
+const std::vector<Scenario>& scenarios() {
+  static const std::vector<Scenario> all = [] {
+    std::vector<Scenario> out = of_the_room();
+    for (Scenario& s : of_elsewhere()) out.push_back(std::move(s));
+    return out;
+  }();
+  return all;
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,153 @@
+#include "lab/simulation/world.hpp"
+
+#include <cmath>
+#include <embree3/rtcore.h>
+#include <numbers>
+#include <stdexcept>
+
+#include "lab/simulation/random.hpp"
+
+namespace kilvo::lab {
+
+struct World::Rays {
+  explicit Rays(const std::vector<Surface>& surfaces) : device(rtcNewDevice(nullptr)), scene(rtcNewScene(device)) {
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+    const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* vertices = static_cast<float*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 4 * surfaces.size()));
+    auto* triangles = static_cast<unsigned*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), 2 * surfaces.size()));
+    unsigned first = 0;
+    for (const Surface& s : surfaces) {
+      for (const Eigen::Vector3d& p :
+           {s.corner, Eigen::Vector3d(s.corner + s.u), Eigen::Vector3d(s.corner + s.u + s.v), Eigen::Vector3d(s.corner + s.v)}) {
+        for (int i = 0; i < 3; ++i) *vertices++ = static_cast<float>(p[i]);
+      }
+      for (const unsigned corner : {0U, 1U, 2U, 0U, 2U, 3U}) *triangles++ = first + corner;
+      first += 4;
+    }
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(scene);
+    if (rtcGetDeviceError(device) != RTC_ERROR_NONE) throw std::runtime_error("Embree could not take the world's triangles");
+  }
+  ~Rays() {
+    rtcReleaseScene(scene);
+    rtcReleaseDevice(device);
+  }
+  Rays(const Rays&) = delete;
+  Rays& operator=(const Rays&) = delete;
+
+  RTCDevice device;
+  RTCScene scene;
+};
+
+std::size_t Scene::add(const Material& material) {
+  materials.push_back(material);
+  return materials.size() - 1;
+}
+
+void Scene::add_box(const Eigen::Vector3d& low, const Eigen::Vector3d& high, std::size_t material) {
+  const Eigen::Vector3d d = high - low;
+  for (int axis = 0; axis < 3; ++axis) {
+    // The edge that runs up, if there is one, is v: bricks lie.
+    const int a = axis == 0 ? 1 : 0, b = axis == 2 ? 1 : 2;
+    const Eigen::Vector3d u = Eigen::Vector3d::Unit(a) * d[a], v = Eigen::Vector3d::Unit(b) * d[b];
+    surfaces.push_back({low, u, v, material});
+    surfaces.push_back({low + Eigen::Vector3d::Unit(axis) * d[axis], u, v, material});
+  }
+}
+
+void Scene::add_pole(double x, double y, double radius, double height, std::size_t material, int sides) {
+  const auto corner = [&](int i) {
+    const double angle = 2 * std::numbers::pi * i / sides;
+    return Eigen::Vector3d(x + radius * std::cos(angle), y + radius * std::sin(angle), 0);
+  };
+  for (int i = 0; i < sides; ++i) surfaces.push_back({corner(i), corner(i + 1) - corner(i), Eigen::Vector3d(0, 0, height), material});
+}
+
+void Scene::add_plates(std::size_t material) {
+  constexpr double below = -0.1;
+  for (const GroundPlate& p : ground.plates()) {
+    const Eigen::Vector3d low(p.x0, p.y0, p.z0), along(p.x1 - p.x0, 0, p.z1 - p.z0), across(0, p.y1 - p.y0, 0);
+    surfaces.push_back({low, along, across, material});
+    const Eigen::Vector3d down0(0, 0, below - p.z0), down1(0, 0, below - p.z1), down(0, 0, below - std::max(p.z0, p.z1));
+    surfaces.push_back({low, across, down0, material});
+    surfaces.push_back({low + along, across, down1, material});
+    surfaces.push_back({low, along, down, material});
+    surfaces.push_back({low + across, along, down, material});
+  }
+}
+
+World::World(Scene scene, std::uint64_t seed) : scene_(std::move(scene)), rays_(std::make_unique<Rays>(scene_.surfaces)) {
+  for (int i = 0; i < pattern_count; ++i) textures_.emplace_back(static_cast<Pattern>(i), seed);
+  const Eigen::Vector3d light = Eigen::Vector3d(0.35, 0.55, 0.76).normalized();
+  Random random(seed, 77);
+  for (const Surface& s : scene_.surfaces) {
+    const auto shade = static_cast<float>(0.72 + 0.28 * std::abs(s.normal().dot(light)));
+    const double u = random.uniform(0, 4), v = random.uniform(0, 4);
+    faces_.push_back({s.corner, s.normal(), s.u.normalized(), s.v.normalized(), {u, v}, shade});
+  }
+}
+
+World::World(World&&) noexcept = default;
+World::~World() = default;
+
+std::optional<Hit> World::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+  const auto at = [](double x) { return static_cast<float>(x); };
+  RTCRayHit query{};
+  query.ray = {at(origin.x()),
+               at(origin.y()),
+               at(origin.z()),
+               0.05F,
+               at(direction.x()),
+               at(direction.y()),
+               at(direction.z()),
+               0,
+               std::numeric_limits<float>::infinity(),
+               ~0U,
+               0,
+               0};
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(rays_->scene, &context, &query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  // Which surface is Embree's to say; where on it, to the last bit, is not left to single precision.
+  Hit hit;
+  hit.surface = query.hit.primID / 2;
+  const Face& face = faces_[hit.surface];
+  const double along = face.normal.dot(direction);
+  if (std::abs(along) < 1e-9) return std::nullopt;
+  hit.range = face.normal.dot(face.corner - origin) / along;
+  hit.cosine = std::abs(along);
+  const Eigen::Vector3d x = origin + hit.range * direction - face.corner;
+  hit.u = x.dot(face.u);
+  hit.v = x.dot(face.v);
+  hit.heading = {direction.dot(face.u), direction.dot(face.v)};
+  return hit;
+}
+
+Colour World::radiance(const Hit& hit, double pixel) const {
+  const Material& material = scene_.materials[scene_.surfaces[hit.surface].material];
+  const Face& face = faces_[hit.surface];
+  constexpr double lens = 1.5;  // pixels; a lens blurs so much
+  // A pixel sees an ellipse, long where the surface is grazed: several round looks along it.
+  const double across = lens * hit.range * pixel, along = across / std::max(hit.cosine, 0.05);
+  const int looks = std::clamp(static_cast<int>(1.2 * along / across) + 1, 1, 8);
+  const double level = Texture::level_for(std::max(across, along / looks));
+  const Eigen::Vector2d middle = Eigen::Vector2d(hit.u, hit.v) + face.offset, heading = hit.heading.normalized();
+  const Texture& texture = textures_[static_cast<std::size_t>(material.pattern)];
+  double tone = 0;
+  for (int k = 0; k < looks; ++k) {
+    const Eigen::Vector2d at = middle + along * ((k + 0.5) / looks - 0.5) * heading;
+    tone += texture.at(at.x(), at.y(), level) / looks;
+  }
+  return face.shade * (material.dark + static_cast<float>(tone) * (material.bright - material.dark));
+}
+
+double World::reflectivity(const Hit& hit) const { return scene_.materials[scene_.surfaces[hit.surface].material].reflectivity; }
+
+}  // namespace kilvo::lab

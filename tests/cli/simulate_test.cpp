@@ -1,0 +1,111 @@
+// kilvo simulate: the files it writes, what others read in them, and KILVO on them.
+#include <filesystem>
+#include <sstream>
+
+#include "tests/cli/story.hpp"
+
+namespace kilvo::stories {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::size_t lines_in(const std::string& path) {
+  const std::string text = read_text(path);
+  return static_cast<std::size_t>(std::ranges::count(text, '\n'));
+}
+
+/// A simulation in a folder of its own.
+struct Simulated {
+  TemporaryFolder folder;
+
+  std::string file(const std::string& name) const { return folder / ("sim/" + name); }
+
+  void expect_files() const {
+    EXPECT_EQ(lines_in(file("gt.tum")), 5001U);
+    EXPECT_EQ(lines_in(file("contacts.gt.csv")), 5002U);
+    EXPECT_EQ(lines_in(file("imu_truth.csv")), 1002U);
+    EXPECT_EQ(lines_in(file("exposure.csv")), 52U);
+    EXPECT_THAT(read_text(file("contacts.gt.csv")), AllOf(HasSubstr("t,left,right\n1700000000.000000000,1,1\n"), HasSubstr(",0,1\n")));
+  }
+
+  void expect_the_shipped_robot() const {
+    const std::string robots = std::string(KILVO_SOURCE_DIR) + "/config/robots/";
+    EXPECT_EQ(read_text(file("robot.urdf")), read_text(robots + "sim.urdf"));
+    std::string config = read_text(file("config.yaml"));
+    config.replace(config.find("robot.urdf"), 10, "sim.urdf");
+    EXPECT_EQ(config, read_text(robots + "sim.yaml"));
+    EXPECT_EQ(kilvo({"config", "check", file("config.yaml")}).code, 0);
+  }
+
+  void expect_that_ros_reads_it() const {
+    const std::string script =
+        "import rosbag, sys\n"
+        "info = rosbag.Bag(sys.argv[1]).get_type_and_topic_info()[1]\n"
+        "print(' '.join(f'{k}={v.msg_type}={v.message_count}' for k, v in sorted(info.items())))\n"
+        "for topic, m, t in rosbag.Bag(sys.argv[1]).read_messages(topics=['/joint_states']):\n"
+        "    assert len(m.name) == len(m.position) == 13, m\n"
+        "    break\n";
+    const Finished f = run_program("/usr/bin/python3", {"-c", script, file("recording.bag")});
+    ASSERT_EQ(f.code, 0) << f.err;
+    EXPECT_EQ(f.out,
+              "/camera/image_raw=sensor_msgs/Image=51 /imu=sensor_msgs/Imu=1001 /joint_states=sensor_msgs/JointState=5001 "
+              "/points=sensor_msgs/PointCloud2=50\n");
+  }
+
+  void expect_that_kilvo_runs_on_it() const {
+    const std::string out = folder / "li";
+    const Finished f = kilvo({"run", folder / "sim", "--sensors", "imu,lidar", "--out", out});
+    ASSERT_EQ(f.code, 0) << f.err;
+    EXPECT_THAT(f.err, HasSubstr("sim/config.yaml"));
+    const auto errors = lab::evaluate(lab::read_tum(out + "/sweeps.tum"), lab::read_tum(file("gt.tum")), lab::Alignment::se3);
+    EXPECT_LT(errors.ate_rmse_m, 0.01);
+    EXPECT_GT(errors.path_length_m, 0.3);
+  }
+};
+
+TEST(Simulate, AWalkIsWrittenReadByOthersAndRunOn) {
+  const Simulated walk;
+  const Finished f = kilvo({"simulate", "room", "--out", walk.folder / "sim", "--seed", "3", "--duration", "5"});
+  ASSERT_EQ(f.code, 0) << f.err;
+  EXPECT_THAT(f.out, HasSubstr("5.0 s of 'room', seed 3"));
+  walk.expect_files();
+  walk.expect_the_shipped_robot();
+  walk.expect_that_ros_reads_it();
+  walk.expect_that_kilvo_runs_on_it();
+}
+
+TEST(Simulate, TheSameSeedGivesTheSameBytes) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a", "b"}) ASSERT_EQ(kilvo({"simulate", "stairs", "--out", folder / name, "--duration", "0.3"}).code, 0);
+  EXPECT_TRUE(read_text(folder / "a/recording.bag") == read_text(folder / "b/recording.bag"));
+  EXPECT_TRUE(read_text(folder / "a/imu_truth.csv") == read_text(folder / "b/imu_truth.csv"));
+}
+
+TEST(Simulate, WhatCannotBeDoneIsSaid) {
+  const TemporaryFolder folder;
+  const auto expect_error = [&](const std::vector<std::string>& words, const std::string& text) {
+    const Finished f = kilvo(words);
+    EXPECT_EQ(f.code, 2) << f.err;
+    EXPECT_THAT(f.err, HasSubstr(text));
+  };
+  expect_error({"simulate", "romm", "--out", folder / "x"}, "no scenario 'romm', nearest is 'room'");
+  expect_error({"simulate", "room", "--out", folder / "x", "--duration", "-1"}, "--duration must be above 0");
+  expect_error({"simulate", "room", "--out", folder / "x", "--duration", "nan"}, "--duration must be above 0");
+  expect_error({"simulate", "room", "--out", folder / "x", "--seed", "-1"}, "--seed");
+  expect_error({"simulate", "room"}, "--out");
+  EXPECT_FALSE(std::filesystem::exists(folder / "x"));
+  expect_error({"simulate", "room", "--out", "/proc/nowhere", "--duration", "1"}, "/proc/nowhere: cannot be created");
+  write_text(folder / "file", "");
+  expect_error({"simulate", "room", "--out", folder / "file", "--duration", "1"}, "file");
+}
+
+TEST(Simulate, HelpListsTheScenarios) {
+  const Finished f = kilvo({"simulate", "--help"});
+  EXPECT_EQ(f.code, 0);
+  for (const char* name : {"room ", "stand ", "in_place ", "run ", "stairs ", "slip ", "soft ", "corridor ", "yard ", "blank_wall "})
+    EXPECT_THAT(f.out, HasSubstr(name));
+}
+
+}  // namespace
+}  // namespace kilvo::stories
