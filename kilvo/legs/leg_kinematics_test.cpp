@@ -1,10 +1,8 @@
 #include "kilvo/legs/leg_kinematics.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <iterator>
 #include <limits>
 
 #include "tests/helpers/test_biped.hpp"
@@ -232,35 +230,6 @@ TEST(LegKinematics, TheTwoFeetMessageIsTurnedMovedAndLoweredToTheSole) {
   EXPECT_LT((feet.foot[1].v[0] - Eigen::Vector3d(0.4, -0.5, -0.6)).norm(), 1e-12);
   s.position.pop_back();
   EXPECT_THAT(fault_of(legs, s), HasSubstr("six"));
-}
-
-TEST(LegKinematics, TheFeetOfTheG1AreMirrorImagesAtZeroJoints) {
-  std::ifstream file(KILVO_SOURCE_DIR "/config/robots/g1_12dof.urdf");
-  Robot robot;
-  robot.urdf.assign(std::istreambuf_iterator<char>(file), {});
-  for (std::size_t side = 0; side < 2; ++side) {
-    const std::string name = side == 0 ? "left" : "right";
-    robot.feet[side] = {
-        name, name + "_ankle_roll_link", {{-0.05, 0.025, -0.035}, {-0.05, -0.025, -0.035}, {0.12, 0.03, -0.035}, {0.12, -0.03, -0.035}}};
-  }
-  robot.imu.link = "pelvis";
-  LegKinematics legs(robot);
-  JointSample s;
-  for (const char* side : {"left", "right"}) {
-    for (const char* joint : {"hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll"}) {
-      s.names.push_back(std::string(side) + "_" + joint + "_joint");
-    }
-  }
-  s.position.assign(12, 0.0);
-  s.velocity.assign(12, 0.0);
-  const Feet feet = feet_of(legs, s);
-  constexpr std::array<std::size_t, 4> mirrored = {1, 0, 3, 2};
-  for (std::size_t k = 0; k < 4; ++k) {
-    const Eigen::Vector3d& right = feet.foot[1].p[mirrored[k]];
-    EXPECT_LT((feet.foot[0].p[k] - Eigen::Vector3d(right.x(), -right.y(), right.z())).norm(), 1e-12);
-    EXPECT_GT(feet.foot[0].p[k].y(), 0.08);
-    EXPECT_NEAR(feet.foot[0].p[k].z(), -0.79, 0.02);
-  }
 }
 
 }  // namespace
