@@ -25,4 +25,12 @@ void prepare_folder(const fs::path& folder) {
   fs::remove(probe, error);
 }
 
+void remove_results(const fs::path& folder) {
+  std::error_code ignored;
+  for (const char* name : {"odometry.tum", "sweeps.tum", "states.csv", "contacts.csv", "modality.csv", "timing.csv", "map.ply",
+                           "summary.json", "report.html"}) {
+    if (fs::is_regular_file(folder / name, ignored)) fs::remove(folder / name, ignored);
+  }
+}
+
 }  // namespace kilvo::cli

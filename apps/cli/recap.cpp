@@ -45,7 +45,7 @@ void Recap::add(const Output& output) {
   const StampedState now{output.t, output.x.pose()};
   if (!first_) first_ = last_on_path_ = now;
   if (last_) modality_seconds_[name_of(output.modality)] += to_seconds(output.t - last_->t);
-  const bool on_path = output.is_sweep || (sweeps_ == 0 && output.t - last_on_path_->t >= path_period);
+  const bool on_path = output.is_sweep || output.t - last_on_path_->t >= (sweeps_ == 0 ? 1 : 3) * path_period;
   if (on_path) {
     path_length_ += (now.T_WI.p - last_on_path_->T_WI.p).norm();
     last_on_path_ = now;
@@ -53,7 +53,13 @@ void Recap::add(const Output& output) {
   last_ = now;
   ++outputs_;
   if (output.is_sweep) ++sweeps_;
+  if (output.contacts) count_touchdowns(*output.contacts);
   judge(output);
+}
+
+void Recap::count_touchdowns(const Contacts& contacts) {
+  for (std::size_t side = 0; side < 2; ++side) contact_events_[side] += contacts.on[side] && !on_[side] ? 1 : 0;
+  on_ = contacts.on;
 }
 
 void Recap::judge(const Output& output) {

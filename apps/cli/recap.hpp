@@ -1,6 +1,7 @@
 // What is to be remembered of the outputs of a run once they are written.
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -48,6 +49,8 @@ class Recap {
   double seconds() const { return first_ ? to_seconds(last_->t - first_->t) : 0; }
   /// Of the way through the sweeps, or through ten poses a second where there are none: jitter in between adds nothing.
   double path_length() const { return path_length_; }
+  /// Touchdowns, left and right.
+  const std::array<std::uint64_t, 2>& contact_events() const { return contact_events_; }
   double start_to_end() const { return first_ ? (last_->T_WI.p - first_->T_WI.p).norm() : 0; }
   const std::map<std::string, double>& modality_seconds() const { return modality_seconds_; }
   /// Why the trajectory cannot be right; empty when nothing speaks against it.
@@ -55,12 +58,15 @@ class Recap {
 
  private:
   void judge(const Output& output);
+  void count_touchdowns(const Contacts& contacts);
 
   std::size_t outputs_ = 0, sweeps_ = 0;
   std::optional<StampedState> first_, last_, last_on_path_;
   double path_length_ = 0;
   std::map<std::string, double> modality_seconds_;
   std::string absurdity_;
+  std::array<bool, 2> on_ = {true, true};
+  std::array<std::uint64_t, 2> contact_events_ = {0, 0};
 };
 
 }  // namespace kilvo::cli

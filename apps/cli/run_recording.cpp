@@ -136,7 +136,8 @@ class Run {
     }
     if (!recap.absurdity().empty()) return "diverged: " + recap.absurdity();
     if (estimator_.statistics().diverged) return "diverged: the estimator lost itself";
-    if (with_lidar && recap.sweeps() == 0) return "no LiDAR scan could be used";
+    const bool legs_used = estimator_.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
+    if (with_lidar && recap.sweeps() == 0 && !legs_used) return "no LiDAR scan could be used";
     return "";
   }
 
@@ -168,6 +169,7 @@ int run_recording(const RunOptions& options) {
   const std::filesystem::path config = config_file(options.config, options.input);
   lab::Settings settings = lab::load_settings(config, options.overrides);
   prepare_folder(options.out);
+  remove_results(options.out);
   if (options.map) prepare_folder(std::filesystem::absolute(*options.map).parent_path());
   SensorChoice choice = choose_sensors(options.sensors, settings, config.string(), options.input);
   lab::require_complete(settings, choice.used);

@@ -92,6 +92,8 @@ std::string summary_json(const RunFacts& facts, const lab::Settings& settings, c
   json["points"] = points_json(facts, source, statistics);
   json["warnings"] = all_warnings(facts, source, statistics);
   json["rollbacks"] = statistics.rollbacks;
+  json["lost_stances"] = statistics.lost_stances;
+  json["contact_events"] = {{"left", recap.contact_events()[0]}, {"right", recap.contact_events()[1]}};
   json["modality_seconds"] = recap.modality_seconds();
   json["outputs"] = recap.outputs();
   json["sweeps"] = recap.sweeps();

@@ -1,5 +1,6 @@
 // The asynchronous phase: IMU and legs.
 #include <algorithm>
+#include <cmath>
 
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/estimator/stopwatch.hpp"
@@ -9,6 +10,9 @@ namespace {
 
 // Without sweeps nothing older than this will be replayed.
 constexpr Duration longest_replay = std::chrono::seconds(2);
+
+// Legs without an IMU for longer than this are no odometry, s.
+constexpr double longest_held_imu = 0.1;
 
 // theta_s of Eq. 16: a sensor that has been silent for longer is lost.
 Duration silence(double rate, double periods, Duration least) { return std::max(least, from_seconds(periods / rate)); }
@@ -30,9 +34,11 @@ void Estimator::choose_modality(Time t) {
 void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   s.accel *= accel_scale_;
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::imu)].used;
+  // Where the IMU was silent as well, nobody can say that the legs are lost.
+  const Time heard = replay_.has_imu() ? replay_.newest_imu().t : s.t;
   replay_.add(s);
   if (s.t < closed_.t) return;
-  if (last_legs_ && s.t - *last_legs_ > silence(robot_.legs.rate, 5, std::chrono::milliseconds(50))) lose_legs(s.t);
+  if (last_legs_ && heard - *last_legs_ > silence(robot_.legs.rate, 5, std::chrono::milliseconds(50))) lose_legs(s.t);
   if (!pending_.empty() && pending_.front().end <= s.t) {
     process_pending(s.t, out);
     closed_ = *estimate_;
@@ -42,7 +48,11 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   keep_finite();
   if (s.t - anchor_.t > longest_replay && pending_.empty()) settle(closed_);
   choose_modality(s.t);
-  if (!last_legs_) emit(out);
+  // While the legs are used their samples carry the outputs, unless one is overdue.
+  constexpr double overdue = 2.5;
+  const bool waits =
+      last_legs_ && s.t - *last_legs_ < std::max(from_seconds(overdue / robot_.legs.rate), from_seconds(overdue * leg_period_));
+  if (!waits) emit(out);
 }
 
 void Estimator::lose_legs(Time t) {
@@ -58,22 +68,40 @@ void Estimator::lose_legs(Time t) {
   last_legs_.reset();
 }
 
+// On the legs alone a wrong velocity makes standing feet look as if they moved, so that they are not used, and nothing mends it. No flight
+// lasts this long: the velocity is taken as unknown, and the feet as standing.
+void Estimator::keep_a_foothold(const LegStep& step) {
+  constexpr Duration longest_flight = std::chrono::milliseconds(500);
+  if (step.foot[0].used || step.foot[1].used || modality_ != Modality::ki) last_stance_ = step.t;
+  if (step.t - last_stance_ < longest_flight) return;
+  constexpr double unknown_velocity = 1.0;  // m/s
+  for (Estimate* e : {&*estimate_, &closed_}) e->P.diagonal().segment<3>(at::v).array() += unknown_velocity * unknown_velocity;
+  settle(closed_);
+  contacts_.restart();
+  stances_.restart();
+  last_stance_ = step.t;
+  ++statistics_.lost_stances;
+}
+
 void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   Stopwatch watch;
   if (s.t < estimate_->t || !replay_.has_imu()) return drop(Sensor::legs, "before the state");
+  if (to_seconds(s.t - replay_.newest_imu().t) > std::max(longest_held_imu, 5 / robot_.imu.rate)) return drop(Sensor::legs, "no IMU");
   auto known = kinematics_->feet(s);
   if (const auto* fault = std::get_if<std::string>(&known)) return drop(Sensor::legs, *fault);
   const Feet& feet = std::get<Feet>(known);
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::legs)].used;
+  if (last_legs_) leg_period_ = std::min(0.1, to_seconds(s.t - *last_legs_));
   last_legs_ = s.t;
 
   replay_.predict_to(*estimate_, s.t, nullptr);
   const State& x = estimate_->x;
   const Eigen::Vector3d omega = replay_.newest_imu().gyro - x.bg;
   const double before_us = watch.lap_us();
-  const Contacts& contacts = contacts_.update(feet, x, omega, replay_.newest_imu().accel - x.ba);
+  const double sigma_v = std::sqrt(std::max(0.0, estimate_->P.block<3, 3>(at::v, at::v).trace() / 3));
+  const Contacts& contacts = contacts_.update(feet, x, omega, replay_.newest_imu().accel - x.ba, sigma_v);
   const double contact_us = watch.lap_us();
-  const LegStep step = stances_.step(feet, contacts_, x, omega);
+  const LegStep step = stances_.step(feet, contacts_, x, omega, sigma_v);
   replay_.add(step);
   replay_.apply(*estimate_, step);
   keep_finite();
@@ -83,6 +111,7 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   const double after_us = watch.lap_us();
 
   choose_modality(s.t);
+  keep_a_foothold(step);
   emit(out, contacts, before_us + contact_us + after_us, contact_us);
 }
 

@@ -36,8 +36,8 @@ struct InitialConfig {
 };
 
 struct EstimatorConfig {
-  double max_wait = 0.2;     // s
-  double max_imu_gap = 0.1;  // s
+  double max_wait = 0.2;       // s
+  double max_imu_gap = 0.025;  // s
   bool gravity_align = true;
   int threads = 1;
 

@@ -1,6 +1,7 @@
 #include "kilvo/estimator/estimator.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace kilvo {
@@ -19,7 +20,14 @@ const char* fault_of(const Measurement& m) {
     if (!imu->gyro.allFinite() || !imu->accel.allFinite()) return "not finite";
     if (imu->gyro.norm() > absurd_gyro || imu->accel.norm() > absurd_accel) return "absurd value";
   }
-  if (const auto* joints = std::get_if<JointSample>(&m); joints != nullptr && joints->position.empty()) return "empty";
+  if (const auto* joints = std::get_if<JointSample>(&m)) {
+    constexpr double absurd_position = 100, absurd_velocity = 100;  // rad or m, rad/s or m/s: no joint turns so fast
+    const auto beyond = [](const std::vector<double>& values, double limit) {
+      return std::ranges::any_of(values, [limit](double v) { return std::isfinite(v) && std::abs(v) > limit; });
+    };
+    if (joints->position.empty()) return "empty";
+    if (beyond(joints->position, absurd_position) || beyond(joints->velocity, absurd_velocity)) return "absurd value";
+  }
   if (const auto* scan = std::get_if<LidarScan>(&m); scan != nullptr && scan->points.empty()) return "empty";
   return nullptr;
 }
@@ -76,14 +84,28 @@ std::vector<Output> Estimator::finish() {
     held.t = std::max(held.t, pending_.front().end);
     if (held.t > replay_.newest_imu().t) replay_.add(held);
     process_pending(held.t, out);
-    if (sweep_ && estimate_->t < held.t) replay_.advance(*estimate_, held.t, trajectory_);
+    if (!sweeps_.empty() && estimate_->t < held.t) replay_.advance(*estimate_, held.t, trajectory_);
   }
-  if (sweep_) emit(out);
+  while (!sweeps_.empty()) {
+    // Each has a time of its own, after what has gone out already.
+    if (last_output_) replay_.advance(*estimate_, std::max(estimate_->t, *last_output_ + Duration(1000)), trajectory_);
+    emit(out);
+  }
   for (std::size_t i = 0; i < pending_.size(); ++i) drop(Sensor::lidar, "no IMU");
   pending_.clear();
   for (const Measurement& m : before_start_) drop(sensor_of(m), "before the start");
   before_start_.clear();
+  warn_of_unused_legs();
   return out;
+}
+
+// Legs that were there and of no use are what the user must know of first.
+void Estimator::warn_of_unused_legs() {
+  const SensorCount& legs = statistics_.sensors[static_cast<std::size_t>(Sensor::legs)];
+  const auto worst = std::ranges::max_element(legs.dropped, {}, [](const auto& cause) { return cause.second; });
+  if (worst == legs.dropped.end() || worst->second < 100 || 10 * worst->second < legs.used) return;
+  statistics_.warnings.push_back("legs: " + std::to_string(worst->second) + " messages could not be used: " + worst->first + "; " +
+                                 std::to_string(legs.used) + " were");
 }
 
 void Estimator::handle(Measurement& m, std::vector<Output>& out) {
@@ -153,6 +175,7 @@ bool Estimator::keep_finite() {
   estimate_ = closed_ = anchor_;
   replay_.clear_steps();
   stances_.restart();
+  contacts_.restart();
   ++statistics_.rollbacks;
   trajectory_.clear();
   trajectory_.push(t, estimate_->x.pose(), estimate_->x.v);
@@ -171,8 +194,11 @@ void Estimator::emit(std::vector<Output>& out, std::optional<Contacts> contacts,
 }
 
 Output Estimator::output_now() {
-  Output o = sweep_ ? std::move(*sweep_) : Output{};
-  sweep_.reset();
+  Output o;
+  if (!sweeps_.empty()) {
+    o = std::move(sweeps_.front());
+    sweeps_.pop_front();
+  }
   o.t = estimate_->t;
   o.x = estimate_->x;
   o.P = estimate_->P;

@@ -43,6 +43,7 @@ class Estimator {
   void handle_before_start(Measurement& m, std::vector<Output>& out);
   void begin(const Start& start, std::vector<Output>& out);
   void bound_pending();
+  void warn_of_unused_legs();
   void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
   bool uses(Sensor s) const { return used_[static_cast<std::size_t>(s)]; }
   bool keep_finite();
@@ -53,6 +54,7 @@ class Estimator {
   void handle_imu(ImuSample s, std::vector<Output>& out);
   void handle_legs(const JointSample& s, std::vector<Output>& out);
   void lose_legs(Time t);
+  void keep_a_foothold(const LegStep& step);
   void choose_modality(Time t);
 
   // sequential.cpp: sweeps
@@ -77,7 +79,7 @@ class Estimator {
     Time end;
   };
   std::deque<PendingScan> pending_;
-  std::optional<Output> sweep_;  // a sweep's results, to go out with the next leg sample
+  std::deque<Output> sweeps_;  // results of sweeps, each to go out with one of the next leg samples
   std::optional<Time> last_output_;
   Trajectory trajectory_;
   VoxelMap map_;
@@ -89,6 +91,8 @@ class Estimator {
   ContactEstimator contacts_;
   StanceTracker stances_;
   std::optional<Time> last_legs_;  // while the legs are used
+  double leg_period_ = 0;          // between the last two leg samples, s
+  Time last_stance_{};             // when a foot was used last
   Time last_sweep_{};              // end of the last sweep, or the start
   Modality modality_ = Modality::coast;
   const char* cause_ = "start";

@@ -84,7 +84,7 @@ int Replay::apply(Estimate& e, const LegStep& step) const {
     const Stance& foot = step.foot[side];
     if (foot.ends) end_stance(e, side);
     if (foot.begins) begin_stance(e, side, foot.point, config_.legs);
-    if (foot.used && !foot.begins) e.x.pc[side] += e.x.R * foot.shift;
+    if (foot.used && !foot.begins) move_stance(e, side, foot.shift);
     any = any || foot.used;
   }
   if (!any || imu_.empty()) return 0;

@@ -189,7 +189,7 @@ TEST(Replay, AcrossAGapOfTheImuTheCovarianceSaysThatNobodyLooked) {
     replay.advance(e, begin_time + milliseconds(200) + gap, record);
     return e.P.block<3, 3>(at::v, at::v).trace();
   };
-  EXPECT_GT(after_gap(milliseconds(120)), 20 * after_gap(milliseconds(90)));
+  EXPECT_GT(after_gap(milliseconds(40)), 20 * after_gap(milliseconds(20)));
   EXPECT_GT(after_gap(milliseconds(500)), after_gap(milliseconds(120)));
 }
 

@@ -62,7 +62,8 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
     add_common_noise(within_scan, info);
     return info;
   };
-  estimate_ = map_.empty() ? prior : update(prior, measured, config_.update).posterior;
+  const bool first = map_.empty();
+  estimate_ = first ? prior : update(prior, measured, config_.update).posterior;
   const bool good = keep_finite();
   StageTimes stages;
   stages.lidar_us = watch.lap_us();
@@ -82,15 +83,14 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   replay_.advance(*estimate_, end, trajectory_);
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::lidar)].used;
   statistics_.diverged = statistics_.diverged || estimate_->x.v.norm() > absurd_speed;
-  last_sweep_ = end;
+  if (first || model.report().matched > 0) last_sweep_ = end;
   choose_modality(end);
-  if (sweep_) emit(out);  // two sweeps within one leg sample
-  sweep_.emplace();
-  sweep_->is_sweep = true;
-  sweep_->registration = model.report();
-  sweep_->points_W = in_world(points, T_WI);
-  sweep_->stages = stages;
-  sweep_->stages.other_us = watch.lap_us();
+  Output& sweep = sweeps_.emplace_back();
+  sweep.is_sweep = true;
+  sweep.registration = model.report();
+  sweep.points_W = in_world(points, T_WI);
+  sweep.stages = stages;
+  sweep.stages.other_us = watch.lap_us();
   // While the legs are used it goes out with the next of their samples, which is not earlier than those that have gone.
   if (!last_legs_) emit(out);
 }

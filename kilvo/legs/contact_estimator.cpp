@@ -13,6 +13,10 @@ using std::chrono::milliseconds;
 constexpr double froude_share = 0.4;
 // How much a new swing counts.
 constexpr double swing_gain = 0.3;
+// A velocity known to this is taken as known, m/s.
+constexpr double known_velocity = 0.02;
+// At the start both feet stand that are at one level, as a share of the height of the IMU over them.
+constexpr double standing_level = 0.025;
 // A swing shorter than this, or slower than a third of the usual, teaches nothing; but several slow ones in a row are how it walks now.
 constexpr Duration shortest_swing = milliseconds(120);
 constexpr double slowest_swing = 0.3;
@@ -27,14 +31,15 @@ constexpr Duration impact_window = milliseconds(20), descent_window = millisecon
 constexpr double impact_speed = 0.4, descent_speed = 0.1;
 // An impact has taken this much of the downward speed.
 constexpr double impact_rest = 0.7;
-// Without any descent: still for so long, near the ground.
+// Without any descent: still for so long.
 constexpr Duration still_frames = milliseconds(200);
 constexpr double detection_threshold = 10;  // theta_d
 constexpr double statistics_time = 2.0;     // s
 
 }  // namespace
 
-FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d& omega) {
+FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d& omega, double sigma_v) {
+  const Eigen::Vector3d up_W = -x.g.normalized();
   FootMotion out;
   out.slowest = std::numeric_limits<double>::infinity();
   for (int i = 0; i < foot.corners; ++i) {
@@ -42,12 +47,12 @@ FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d
     const Eigen::Vector3d v_W = x.v + x.R * (omega.cross(foot.p[k]) + foot.v[k]);
     out.slowest = std::min(out.slowest, v_W.squaredNorm());
   }
-  out.slowest = std::sqrt(out.slowest);
-  const SolePoint low = lowest_point(foot, x.R.matrix().transpose() * Eigen::Vector3d::UnitZ());
+  out.slowest = std::max(0.0, std::sqrt(out.slowest) - 2 * std::max(0.0, sigma_v - known_velocity));
+  const SolePoint low = lowest_point(foot, x.R.matrix().transpose() * up_W);
   const Eigen::Vector3d v_W = x.v + x.R * (omega.cross(low.p) + low.v);
   out.speed = v_W.norm();
-  out.vertical = v_W.z();
-  out.lowest_W = x.pose() * low.p;
+  out.vertical = up_W.dot(v_W);
+  out.height = up_W.dot(x.pose() * low.p);
   return out;
 }
 
@@ -58,8 +63,9 @@ void ContactEstimator::start(const Feet& feet, const State& x, const std::array<
     FootState& f = foot_[side];
     f = {};
     f.since = feet.t - milliseconds(1000);
-    f.ground_z = motion[side].lowest_W.z();
-    contacts_.on[side] = true;
+    f.ground_z = motion[side].height;
+    // The foot that is clearly higher than the other is in the air, or will show that it is not.
+    contacts_.on[side] = motion[side].height - motion[1 - side].height < standing_level * leg;
   }
   started_ = true;
 }
@@ -107,7 +113,7 @@ void ContactEstimator::learn(double peak, Duration swing) {
   if (slow_swings_ == 0 || walks_so) swing_speed_ += swing_gain * (peak - swing_speed_);
 }
 
-// Deviation of the acceleration from its usual values (while a foot swings, or from the start), in their standard deviations.
+// Deviation of the acceleration from its usual values of the last seconds, in their standard deviations.
 void ContactEstimator::deviate(const Eigen::Vector3d& accel, double dt) {
   constexpr double least_variance = 1e-4;  // (m/s^2)^2
   const double share = std::clamp(dt / statistics_time, 0.0, 1.0);
@@ -118,8 +124,9 @@ void ContactEstimator::deviate(const Eigen::Vector3d& accel, double dt) {
   accel_variance_ += share * (off.cwiseAbs2() - accel_variance_);
 }
 
-const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel) {
-  const std::array<FootMotion, 2> motion = {motion_of(feet.foot[0], x, omega), motion_of(feet.foot[1], x, omega)};
+const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel,
+                                         double sigma_v) {
+  const std::array<FootMotion, 2> motion = {motion_of(feet.foot[0], x, omega, sigma_v), motion_of(feet.foot[1], x, omega, sigma_v)};
   if (!started_) {
     contacts_.t = feet.t;
     start(feet, x, motion);
@@ -145,8 +152,8 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
       f.impact.reset();
       f.slow.reset();
     }
-    if (contacts_.on[side]) f.ground_z = m.lowest_W.z();
-    contacts_.clearance[side] = m.lowest_W.z() - f.ground_z;
+    if (contacts_.on[side]) f.ground_z = m.height;
+    contacts_.clearance[side] = m.height - f.ground_z;
     contacts_.d_fv[side] = detection_threshold * m.slowest / (config_.lift_off_speed * swing_speed_);
   }
   return contacts_;

@@ -16,26 +16,27 @@ namespace kilvo {
 struct Contacts {
   Time t{};
   std::array<bool, 2> on = {true, true};
-  std::array<double, 2> clearance = {0, 0};  // of the lowest corner over the ground patch, m
+  std::array<double, 2> clearance = {0, 0};  // of the lowest point over where it stood last, m
   double d_a = 0;                            // normalised deviation of the acceleration
   std::array<double, 2> d_fv = {0, 0};       // normalised deviation of the foot's velocity; above 10: it moves
 };
 
 /// A sole's slowest corner and its lowest point, in the world.
 struct FootMotion {
-  double slowest = 0;                                  // speed of the slowest corner, m/s
-  double speed = 0;                                    // of the lowest point, m/s
-  double vertical = 0;                                 // its upward velocity, m/s
-  Eigen::Vector3d lowest_W = Eigen::Vector3d::Zero();  // the lowest point, m
+  double slowest = 0;   // speed of the slowest corner, m/s
+  double speed = 0;     // of the lowest point, m/s
+  double vertical = 0;  // its upward velocity, m/s
+  double height = 0;    // of the lowest point, against gravity, m
 };
-FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d& omega);
+/// `sigma_v`: uncertainty of the state's velocity, m/s; what of a corner's speed it may explain is taken off.
+FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0);
 
 class ContactEstimator {
  public:
   explicit ContactEstimator(const LegConfig& config) : config_(config) {}
 
   /// `x`: the state at feet.t. `omega`, `accel`: bias-free rate (rad/s) and specific force (m/s^2) of the IMU.
-  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel);
+  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel, double sigma_v = 0);
 
   const Contacts& contacts() const { return contacts_; }
   /// The largest speed of a foot in its last swings, m/s; what all speeds are compared with.

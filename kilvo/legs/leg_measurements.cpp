@@ -88,6 +88,14 @@ void begin_stance(Estimate& e, std::size_t side, const SolePoint& point, const L
   e.P.block<3, 3>(pc, pc).diagonal().array() += config.position_sigma * config.position_sigma;
 }
 
+void move_stance(Estimate& e, std::size_t side, const Eigen::Vector3d& shift) {
+  const int pc = at::pcl + 3 * static_cast<int>(side);
+  const Eigen::Matrix3d J = -e.x.R.matrix() * skew(shift);
+  e.x.pc[side] += e.x.R * shift;
+  e.P.middleRows<3>(pc) += (J * e.P.middleRows<3>(at::R)).eval();
+  e.P.middleCols<3>(pc) += (e.P.middleCols<3>(at::R) * J.transpose()).eval();
+}
+
 void end_stance(Estimate& e, std::size_t side) {
   const int pc = at::pcl + 3 * static_cast<int>(side);
   e.P.middleRows<3>(pc).setZero();
@@ -102,7 +110,8 @@ void StanceTracker::restart() {
   last_.reset();
 }
 
-LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega) {
+LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega,
+                            double sigma_v) {
   LegStep out;
   out.t = feet.t;
   out.dt = last_ ? std::clamp(to_seconds(feet.t - *last_), shortest_step, longest_step) : longest_step;
@@ -144,7 +153,8 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
     const double moving2 = (x.v + x.R * (omega.cross(foot.point.p) + foot.point.v)).squaredNorm();
     const double entering = std::max(0.0, 1.0 - (phase - config_.entry_delay) / entry_time);
     foot.looseness =
-        std::clamp(1.0 + moving2 / (config_.velocity_sigma * config_.velocity_sigma) + (loosest - 1) * entering, 1.0, loosest * loosest);
+        std::clamp(1.0 + moving2 / (config_.velocity_sigma * config_.velocity_sigma + sigma_v * sigma_v) + (loosest - 1) * entering, 1.0,
+                   loosest * loosest);
   }
   return out;
 }

@@ -63,6 +63,8 @@ class LegModel {
 
 /// Puts the contact position of a foot into the state: mean, covariance and cross-covariance from the pose and the kinematics.
 void begin_stance(Estimate& e, std::size_t side, const SolePoint& point, const LegConfig& config);
+/// Moves it along the sole, by `shift` in the IMU frame: mean and covariance.
+void move_stance(Estimate& e, std::size_t side, const Eigen::Vector3d& shift);
 /// Takes it out: its rows and columns become zero.
 void end_stance(Estimate& e, std::size_t side);
 
@@ -71,8 +73,8 @@ class StanceTracker {
  public:
   explicit StanceTracker(const LegConfig& config) : config_(config) {}
 
-  /// `omega`: bias-free, rad/s.
-  LegStep step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega);
+  /// `omega`: bias-free, rad/s. `sigma_v`: uncertainty of the velocity of x, m/s.
+  LegStep step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0);
 
   /// Both feet leave the filter at the next step, to enter anew.
   void restart();

@@ -1,5 +1,6 @@
 #include "kilvo/lidar/downsample.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -135,7 +136,7 @@ std::vector<PointCluster> downsample(std::span<const PointXYZI> points, const SE
     c.outer[5] += d.z() * d.z();
   }
   std::vector<Cell>& cells = table.cells();
-  const std::vector<std::uint32_t> owner = owners_of(table, R, t, reach / cell);
+  const std::vector<std::uint32_t> owner = owners_of(table, R, t, std::min(reach / cell, 0.25));
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (owner[i] != i) join(cells[i], cells[owner[i]]);
   }
