@@ -102,8 +102,9 @@ std::vector<Output> Estimator::finish() {
 // Legs that were there and of no use are what the user must know of first.
 void Estimator::warn_of_unused_legs() {
   const SensorCount& legs = statistics_.sensors[static_cast<std::size_t>(Sensor::legs)];
-  const auto worst = std::ranges::max_element(legs.dropped, {}, [](const auto& cause) { return cause.second; });
-  if (worst == legs.dropped.end() || worst->second < 100 || 10 * worst->second < legs.used) return;
+  const auto weight = [](const auto& cause) { return cause.first == "before the start" ? 0 : cause.second; };
+  const auto worst = std::ranges::max_element(legs.dropped, {}, weight);
+  if (worst == legs.dropped.end() || weight(*worst) < 100 || 10 * worst->second < legs.used) return;
   statistics_.warnings.push_back("legs: " + std::to_string(worst->second) + " messages could not be used: " + worst->first + "; " +
                                  std::to_string(legs.used) + " were");
 }

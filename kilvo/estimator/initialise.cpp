@@ -55,14 +55,14 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   const auto gyro = statistics_of(window_, &ImuSample::gyro);
   const auto accel = statistics_of(window_, &ImuSample::accel);
   const double unit = unit_of(accel.mean.norm());
-  constexpr double largest_gyro_bias = 0.1;  // rad/s
+  constexpr double largest_gyro_bias = 0.03;  // rad/s; a larger mean is motion
   // A slow sway has a small deviation and is no rest: its rate would be taken for the bias. It shows as a change within the window.
   constexpr double largest_change = 0.004;  // rad/s
   const auto middle = window_.begin() + static_cast<std::ptrdiff_t>(window_.size() / 2);
   const std::deque<ImuSample> older(window_.begin(), middle), newer(middle, window_.end());
   const Eigen::Vector3d change = statistics_of(newer, &ImuSample::gyro).mean - statistics_of(older, &ImuSample::gyro).mean;
-  const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && gyro.mean.norm() < largest_gyro_bias && change.cwiseAbs().maxCoeff() < largest_change &&
-                     accel.sigma.maxCoeff() * unit < config_.still_accel;
+  const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && gyro.mean.norm() < largest_gyro_bias &&
+                     change.cwiseAbs().maxCoeff() < largest_change && accel.sigma.maxCoeff() * unit < config_.still_accel;
   if (still) return start(true);
   if (s.t - *first_ >= from_seconds(config_.moving_start)) return start(false);
   return std::nullopt;
