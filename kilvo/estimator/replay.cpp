@@ -70,11 +70,15 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   step(interval);
 }
 
-Eigen::Vector3d Replay::gyro_at(Time t) const {
+std::optional<Eigen::Vector3d> Replay::gyro_at(Time t) const {
   const auto next = std::lower_bound(imu_.begin(), imu_.end(), t, [](const ImuSample& s, Time value) { return s.t < value; });
-  if (next == imu_.end()) return imu_.back().gyro;
+  if (next == imu_.end()) {
+    if (to_seconds(t - imu_.back().t) > config_.max_imu_gap) return std::nullopt;
+    return imu_.back().gyro;
+  }
   if (next == imu_.begin() || next->t == t) return next->gyro;
   const ImuSample& a = *(next - 1);
+  if (to_seconds(next->t - a.t) > config_.max_imu_gap) return std::nullopt;
   return a.gyro + (to_seconds(t - a.t) / to_seconds(next->t - a.t)) * (next->gyro - a.gyro);
 }
 
@@ -88,7 +92,10 @@ int Replay::apply(Estimate& e, const LegStep& step) const {
     any = any || foot.used;
   }
   if (!any || imu_.empty()) return 0;
-  LegModel model(step, gyro_at(step.t), config_.legs);
+  // Without a rate the velocity of a foot that is a leg away from the IMU is anything.
+  const auto gyro = gyro_at(step.t);
+  if (!gyro) return 0;
+  LegModel model(step, *gyro, config_.legs);
   // The rows are nearly linear: one iteration.
   UpdateConfig once;
   once.max_iterations = 1;

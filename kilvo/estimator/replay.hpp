@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 
 #include "kilvo/estimator/config.hpp"
 #include "kilvo/filter/trajectory.hpp"
@@ -37,7 +38,7 @@ class Replay {
 
  private:
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
-  Eigen::Vector3d gyro_at(Time t) const;
+  std::optional<Eigen::Vector3d> gyro_at(Time t) const;  // none within a gap
   FootOrientations standing_at(Time t) const;
 
   EstimatorConfig config_;
