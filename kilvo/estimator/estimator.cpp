@@ -11,8 +11,6 @@ namespace {
 constexpr Duration trajectory_length = std::chrono::milliseconds(500);
 // Scans that wait for the IMU: more than two seconds of them are not worth waiting for.
 constexpr std::size_t max_pending = 20;
-// Before the start, as much as a moving start may need.
-constexpr std::size_t max_before_start = 200000;
 // What no sensor measures; nullptr: nothing wrong.
 const char* fault_of(const Measurement& m) {
   constexpr double absurd_gyro = 300, absurd_accel = 5000;  // rad/s, m/s^2 (or g): beyond any IMU's range
@@ -95,18 +93,21 @@ std::vector<Output> Estimator::finish() {
   pending_.clear();
   for (const Measurement& m : before_start_) drop(sensor_of(m), "before the start");
   before_start_.clear();
-  warn_of_unused_legs();
+  warn_of_unused_sensors();
   return out;
 }
 
-// Legs that were there and of no use are what the user must know of first.
-void Estimator::warn_of_unused_legs() {
-  const SensorCount& legs = statistics_.sensors[static_cast<std::size_t>(Sensor::legs)];
-  const auto weight = [](const auto& cause) { return cause.first == "before the start" ? 0 : cause.second; };
-  const auto worst = std::ranges::max_element(legs.dropped, {}, weight);
-  if (worst == legs.dropped.end() || weight(*worst) < 100 || 10 * worst->second < legs.used) return;
-  statistics_.warnings.push_back("legs: " + std::to_string(worst->second) + " messages could not be used: " + worst->first + "; " +
-                                 std::to_string(legs.used) + " were");
+// A sensor that was there and of little use is what the user must know of first.
+void Estimator::warn_of_unused_sensors() {
+  constexpr std::uint64_t few = 20;  // messages
+  for (int i = 0; i < sensor_count; ++i) {
+    const SensorCount& sensor = statistics_.sensors[static_cast<std::size_t>(i)];
+    const auto weight = [](const auto& cause) { return cause.first == "before the start" || cause.first == "not used" ? 0 : cause.second; };
+    const auto worst = std::ranges::max_element(sensor.dropped, {}, weight);
+    if (worst == sensor.dropped.end() || weight(*worst) < few || 10 * weight(*worst) < sensor.used) continue;
+    statistics_.warnings.push_back(std::string(name_of(static_cast<Sensor>(i))) + ": " + std::to_string(worst->second) +
+                                   " messages could not be used: " + worst->first + "; " + std::to_string(sensor.used) + " were");
+  }
 }
 
 void Estimator::handle(Measurement& m, std::vector<Output>& out) {
@@ -133,7 +134,9 @@ void Estimator::handle_before_start(Measurement& m, std::vector<Output>& out) {
   std::optional<Start> start;
   if (const auto* imu = std::get_if<ImuSample>(&m)) start = initialiser_.add(*imu);
   before_start_.push_back(std::move(m));
-  if (before_start_.size() > max_before_start) {
+  // A moving start looks this far back and no farther.
+  const Time oldest = completion_of(before_start_.back()) - from_seconds(config_.initial.moving_start + 1.0);
+  while (completion_of(before_start_.front()) < oldest) {
     drop(sensor_of(before_start_.front()), "before the start");
     before_start_.pop_front();
   }

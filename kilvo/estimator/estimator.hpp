@@ -43,7 +43,7 @@ class Estimator {
   void handle_before_start(Measurement& m, std::vector<Output>& out);
   void begin(const Start& start, std::vector<Output>& out);
   void bound_pending();
-  void warn_of_unused_legs();
+  void warn_of_unused_sensors();
   void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
   bool uses(Sensor s) const { return used_[static_cast<std::size_t>(s)]; }
   bool keep_finite();

@@ -26,7 +26,7 @@ struct LegConfig {
         Field{"touchdown_speed", &LegConfig::touchdown_speed, "-",
               "a descending foot with a corner slower than this share of the swing speed has reached the ground"},
         Field{"impact_drop", &LegConfig::impact_drop, "-",
-              "a descending foot whose speed falls below this share of what it was 20 ms before has reached the ground"},
+              "a descending foot whose speed falls below this share of its largest within 20 ms has reached the ground"},
         Field{"settling", &LegConfig::settling, "s", "after touchdown a foot needs seven times the speed to be called lifted, for so long"},
         Field{"velocity_sigma", &LegConfig::velocity_sigma, "m/s", "standard deviation of the velocity of a standing foot"},
         Field{"velocity_correlation", &LegConfig::velocity_correlation, "s", "correlation time of that: rows closer together share it"},
