@@ -61,7 +61,13 @@ std::optional<std::string> Timeline::admit(Measurement m, Time key) {
 }
 
 bool Timeline::may_go(Time key) const {
-  if (ended_ || *newest_of_all_ - key >= max_wait_) return true;
+  // The IMU, which everything needs, is the clock: one sensor that is ahead of it must not make all others late. If it is silent, so much
+  // may gather and no more.
+  constexpr std::size_t most = 5000;
+  const auto& imu = newest_[static_cast<std::size_t>(Sensor::imu)];
+  const bool waited =
+      expected_[static_cast<std::size_t>(Sensor::imu)] ? imu && *imu - key >= max_wait_ : *newest_of_all_ - key >= max_wait_;
+  if (ended_ || waited || waiting_.size() > most) return true;
   for (std::size_t s = 0; s < sensor_count; ++s) {
     if (expected_[s] && (!newest_[s] || *newest_[s] < key)) return false;
   }

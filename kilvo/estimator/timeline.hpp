@@ -1,5 +1,5 @@
 // Puts measurements into the order of their stamps. A measurement is released when every expected sensor has been heard beyond it, or
-// when it has waited max_wait of data time.
+// when it has waited max_wait of the IMU's time.
 #pragma once
 
 #include <array>
