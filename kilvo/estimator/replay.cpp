@@ -64,10 +64,7 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   if (e.t >= until) return;
   ImuSample held = imu_.back();
   held.t = until;
-  ImuInterval interval = interval_between(imu_.back(), held, e.t, until, e.x);
-  interval.begin = e.t;
-  interval.end = until;
-  step(interval);
+  step(interval_between(imu_.back(), held, e.t, until, e.x));
 }
 
 std::optional<Eigen::Vector3d> Replay::gyro_at(Time t) const {

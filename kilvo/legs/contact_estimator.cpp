@@ -44,12 +44,11 @@ FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d
   out.slowest = std::numeric_limits<double>::infinity();
   for (int i = 0; i < foot.corners; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    const Eigen::Vector3d v_W = x.v + x.R * (omega.cross(foot.p[k]) + foot.v[k]);
-    out.slowest = std::min(out.slowest, v_W.squaredNorm());
+    out.slowest = std::min(out.slowest, velocity_W(x, foot.p[k], foot.v[k], omega).squaredNorm());
   }
   out.slowest = std::max(0.0, std::sqrt(out.slowest) - 2 * std::max(0.0, sigma_v - known_velocity));
   const SolePoint low = lowest_point(foot, x.R.matrix().transpose() * up_W);
-  const Eigen::Vector3d v_W = x.v + x.R * (omega.cross(low.p) + low.v);
+  const Eigen::Vector3d v_W = velocity_W(x, low.p, low.v, omega);
   out.speed = v_W.norm();
   out.vertical = up_W.dot(v_W);
   out.height = up_W.dot(x.pose() * low.p);

@@ -21,6 +21,11 @@ struct Contacts {
   std::array<double, 2> d_fv = {0, 0};       // normalised deviation of the foot's velocity; above 10: it moves
 };
 
+/// Velocity in the world of a point that is at p_I and moves by v_I relative to the IMU, m/s. `omega`: bias-free rate, rad/s.
+inline Eigen::Vector3d velocity_W(const State& x, const Eigen::Vector3d& p_I, const Eigen::Vector3d& v_I, const Eigen::Vector3d& omega) {
+  return x.v + x.R * (omega.cross(p_I) + v_I);
+}
+
 /// A sole's slowest corner and its lowest point, in the world.
 struct FootMotion {
   double slowest = 0;   // speed of the slowest corner, m/s

@@ -131,7 +131,7 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
     std::array<double, max_corners> speed2{};
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < static_cast<std::size_t>(pose.corners); ++k) {
-      speed2[k] = (x.v + x.R * (omega.cross(pose.p[k]) + pose.v[k])).squaredNorm();
+      speed2[k] = velocity_W(x, pose.p[k], pose.v[k], omega).squaredNorm();
       least = std::min(least, speed2[k]);
     }
     Weights weights{};
@@ -150,7 +150,7 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
     }
     weights_[side] = weights;
     // Eq. 8: what moves is believed less; so is what has just arrived.
-    const double moving2 = (x.v + x.R * (omega.cross(foot.point.p) + foot.point.v)).squaredNorm();
+    const double moving2 = velocity_W(x, foot.point.p, foot.point.v, omega).squaredNorm();
     const double entering = std::max(0.0, 1.0 - (phase - config_.entry_delay) / entry_time);
     foot.looseness =
         std::clamp(1.0 + moving2 / (config_.velocity_sigma * config_.velocity_sigma + sigma_v * sigma_v) + (loosest - 1) * entering, 1.0,
