@@ -22,12 +22,21 @@ Duration silence(double rate, double periods, Duration least) { return std::max(
 void Estimator::choose_modality(Time t) {
   const bool lidar = uses(Sensor::lidar) && t - last_sweep_ <= silence(robot_.lidar.rate, 3, std::chrono::milliseconds(300));
   const bool legs = last_legs_.has_value();
-  const Modality now = legs ? (lidar ? Modality::kil : Modality::ki) : (lidar ? Modality::li : Modality::coast);
+  // Vision needs the surfaces that the LiDAR sees.
+  const bool camera = lidar && last_image_ && t - *last_image_ <= silence(robot_.camera.rate, 3, std::chrono::milliseconds(300));
+  const Modality with_legs = lidar ? (camera ? Modality::kilv : Modality::kil) : Modality::ki;
+  const Modality without_legs = lidar ? (camera ? Modality::liv : Modality::li) : Modality::coast;
+  const Modality now = legs ? with_legs : without_legs;
   if (now == modality_) return;
-  const bool had_lidar = modality_ == Modality::kil || modality_ == Modality::li;
-  const bool had_legs = modality_ == Modality::kil || modality_ == Modality::ki;
-  if (modality_ != Modality::coast || cause_ != std::string_view("start"))
-    cause_ = lidar != had_lidar ? (lidar ? "lidar is back" : "lidar lost") : (legs && !had_legs ? "legs are back" : "legs lost");
+  if (modality_ != Modality::coast || cause_ != std::string_view("start")) {
+    if (lidar != has_lidar(modality_)) {
+      cause_ = lidar ? "lidar is back" : "lidar lost";
+    } else if (legs != has_legs(modality_)) {
+      cause_ = legs ? "legs are back" : "legs lost";
+    } else {
+      cause_ = camera ? "images are used" : "camera lost";
+    }
+  }
   modality_ = now;
 }
 

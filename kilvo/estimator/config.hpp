@@ -7,8 +7,10 @@
 #include "kilvo/filter/update.hpp"
 #include "kilvo/legs/leg_config.hpp"
 #include "kilvo/lidar/lidar_config.hpp"
+#include "kilvo/map/visual_map.hpp"
 #include "kilvo/map/voxel_map.hpp"
 #include "kilvo/math/field.hpp"
+#include "kilvo/vision/vision_config.hpp"
 
 namespace kilvo {
 
@@ -46,6 +48,8 @@ struct EstimatorConfig {
   UpdateConfig update;
   MapConfig map;
   LidarConfig lidar;
+  VisionConfig vision;
+  VisualMapConfig visual_map;
   LegConfig legs;
 
   static constexpr auto fields() {

@@ -9,8 +9,8 @@ namespace {
 
 // Undistortion never looks farther back than this.
 constexpr Duration trajectory_length = std::chrono::milliseconds(500);
-// Scans that wait for the IMU: more than two seconds of them are not worth waiting for.
-constexpr std::size_t max_pending = 20;
+// Scans and images that wait for the IMU: more than two seconds of them are not worth waiting for.
+constexpr std::size_t max_pending = 60;
 // What no sensor measures; nullptr: nothing wrong.
 const char* fault_of(const Measurement& m) {
   constexpr double absurd_gyro = 300, absurd_accel = 5000;  // rad/s, m/s^2 (or g): beyond any IMU's range
@@ -42,12 +42,15 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       trajectory_(trajectory_length),
       map_(config.map),
       workers_(config.threads),
+      visual_map_(config.visual_map),
       contacts_(config.legs),
       stances_(config.legs) {
   if (!uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.leaf_size() * (1 + 1e-9))
     throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
   if (uses(Sensor::legs)) kinematics_.emplace(robot);
+  if (uses(Sensor::camera)) camera_.emplace(robot.camera);
+  T_CI_ = robot.camera.T_imu_camera.inverse();
 }
 
 std::vector<Output> Estimator::push(Measurement m) {
@@ -89,7 +92,7 @@ std::vector<Output> Estimator::finish() {
     if (last_output_) replay_.advance(*estimate_, std::max(estimate_->t, *last_output_ + Duration(1000)), trajectory_);
     emit(out);
   }
-  for (std::size_t i = 0; i < pending_.size(); ++i) drop(Sensor::lidar, "no IMU");
+  for (const Pending& p : pending_) drop(std::holds_alternative<LidarScan>(p.what) ? Sensor::lidar : Sensor::camera, "no IMU");
   pending_.clear();
   for (const Measurement& m : before_start_) drop(sensor_of(m), "before the start");
   before_start_.clear();
@@ -119,15 +122,21 @@ void Estimator::handle(Measurement& m, std::vector<Output>& out) {
     handle_legs(*joints, out);
   } else if (auto* scan = std::get_if<LidarScan>(&m)) {
     const Time end = completion_of(m);
-    pending_.push_back({std::move(*scan), end});
+    const Time begin = begin_of(*scan);
+    pending_.push_back({std::move(*scan), begin, end});
+    bound_pending();
+  } else if (auto* image = std::get_if<CameraImage>(&m)) {
+    const Time t = image->t;
+    if (const char* fault = image_fault(*image)) return drop(Sensor::camera, fault);
+    pending_.push_back({std::move(*image), t, t});
     bound_pending();
   }
 }
 
 void Estimator::bound_pending() {
   if (pending_.size() <= max_pending) return;
+  drop(std::holds_alternative<LidarScan>(pending_.front().what) ? Sensor::lidar : Sensor::camera, "no IMU");
   pending_.pop_front();
-  drop(Sensor::lidar, "no IMU");
 }
 
 void Estimator::handle_before_start(Measurement& m, std::vector<Output>& out) {

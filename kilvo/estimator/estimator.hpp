@@ -14,8 +14,11 @@
 #include "kilvo/estimator/replay.hpp"
 #include "kilvo/estimator/timeline.hpp"
 #include "kilvo/filter/trajectory.hpp"
+#include "kilvo/map/visual_map.hpp"
 #include "kilvo/map/voxel_map.hpp"
 #include "kilvo/sensors/robot.hpp"
+#include "kilvo/vision/camera.hpp"
+#include "kilvo/vision/photometric.hpp"
 
 namespace kilvo {
 
@@ -59,8 +62,14 @@ class Estimator {
 
   // sequential.cpp: sweeps
   void process_pending(Time until, std::vector<Output>& out);
+  bool waits_for_scan(Time image, Time until) const;
   void process(const LidarScan& scan, Time end, std::vector<Output>& out);
   void settle(const Estimate& e);  // nothing before it will be replayed
+
+  // images.cpp
+  const char* image_fault(const CameraImage& image);
+  void process(const CameraImage& image);
+  void learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid, const DepthView& depth);
 
   Robot robot_;
   EstimatorConfig config_;
@@ -74,18 +83,25 @@ class Estimator {
   Estimate closed_;                   // at the newest IMU sample, all intervals before it with both their ends
   Estimate anchor_;                   // after the last sweep, at the sweep's own time; what came since is replayed on it
   Replay replay_;                     // from the anchor on
-  struct PendingScan {
-    LidarScan scan;
-    Time end;
+  struct Pending {
+    std::variant<LidarScan, CameraImage> what;
+    Time begin, end;  // of the scan; the image's stamp
+    Time middle() const { return begin + (end - begin) / 2; }
   };
-  std::deque<PendingScan> pending_;
+  std::deque<Pending> pending_;  // by end
   std::deque<Output> sweeps_;  // results of sweeps, each to go out with one of the next leg samples
   std::optional<Time> last_output_;
   Trajectory trajectory_;
   VoxelMap map_;
   Workers workers_;
   MapError map_error_;
-  bool degenerate_ = false;  // the last sweep had a weak direction
+  PoseCovariance weak_ = PoseCovariance::Zero();  // takes a pose error to its part along what the last sweep did not know
+
+  std::optional<Camera> camera_;
+  SE3 T_CI_;
+  VisualMap visual_map_;
+  std::vector<PointXYZI> seen_W_;      // points of the last sweep
+  std::vector<std::uint8_t> picture_;  // of the last image
 
   std::optional<LegKinematics> kinematics_;
   ContactEstimator contacts_;
@@ -94,6 +110,8 @@ class Estimator {
   double leg_period_ = 0;          // between the last two leg samples, s
   Time last_stance_{};             // when a foot was used last
   Time last_sweep_{};              // end of the last sweep, or the start
+  Time last_middle_{};             // of the last sweep
+  std::optional<Time> last_image_;  // that was used
   Modality modality_ = Modality::coast;
   const char* cause_ = "start";
   Statistics statistics_;

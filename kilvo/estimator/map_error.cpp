@@ -4,6 +4,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "kilvo/filter/pose_error.hpp"
+
 namespace kilvo {
 namespace {
 
@@ -12,23 +14,6 @@ constexpr double change = 1.25;
 constexpr std::size_t max_epochs = 65536;
 // What planes that are not quite planes cost where all directions are held equally, m.
 constexpr double plane_error = 0.00015;
-
-// (theta in the body, error of p) -> twist of the world at its origin: phi = R theta, u = dp + p x phi.
-PoseCovariance to_origin(const SE3& T) {
-  PoseCovariance G = PoseCovariance::Zero();
-  G.topLeftCorner<3, 3>() = T.R.matrix();
-  G.bottomLeftCorner<3, 3>() = skew(T.p) * T.R.matrix();
-  G.bottomRightCorner<3, 3>().setIdentity();
-  return G;
-}
-
-PoseCovariance from_origin(const SE3& T) {
-  PoseCovariance G = PoseCovariance::Zero();
-  G.topLeftCorner<3, 3>() = T.R.matrix().transpose();
-  G.bottomLeftCorner<3, 3>() = -skew(T.p);
-  G.bottomRightCorner<3, 3>().setIdentity();
-  return G;
-}
 
 // A root of a covariance that may be singular.
 PoseCovariance root_of(const PoseCovariance& M) {

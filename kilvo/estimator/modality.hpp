@@ -13,4 +13,8 @@ constexpr const char* name_of(Modality m) {
   return names[static_cast<int>(m)];
 }
 
+constexpr bool has_legs(Modality m) { return m == Modality::kilv || m == Modality::kil || m == Modality::ki; }
+constexpr bool has_lidar(Modality m) { return m != Modality::ki && m != Modality::coast; }
+constexpr bool has_camera(Modality m) { return m == Modality::kilv || m == Modality::liv; }
+
 }  // namespace kilvo

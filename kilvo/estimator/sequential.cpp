@@ -30,12 +30,32 @@ void Estimator::settle(const Estimate& e) {
   replay_.forget_before(anchor_.t);
 }
 
+// Sweeps and images update the state at their own times, in the order of these: the middle of a sweep, the stamp of an image.
 void Estimator::process_pending(Time until, std::vector<Output>& out) {
   while (!pending_.empty() && pending_.front().end <= until) {
-    const PendingScan next = std::move(pending_.front());
-    pending_.pop_front();
-    process(next.scan, next.end, out);
+    auto next = pending_.begin();
+    if (std::holds_alternative<CameraImage>(next->what)) {
+      const Time image = next->end;
+      const auto before = std::ranges::find_if(
+          pending_, [&](const Pending& p) { return p.end <= until && p.middle() <= image && std::holds_alternative<LidarScan>(p.what); });
+      if (before == pending_.end() && waits_for_scan(image, until)) return;
+      if (before != pending_.end()) next = before;
+    }
+    const Pending chosen = std::move(*next);
+    pending_.erase(next);
+    if (const auto* scan = std::get_if<LidarScan>(&chosen.what)) {
+      process(*scan, chosen.end, out);
+    } else {
+      process(std::get<CameraImage>(chosen.what));
+    }
   }
+}
+
+// A scan whose middle is before the image is still being taken: it goes first, if it comes at all.
+bool Estimator::waits_for_scan(Time image, Time until) const {
+  const Duration period = from_seconds(1 / robot_.lidar.rate);
+  const bool expected = uses(Sensor::lidar) && last_middle_ != Time{} && last_middle_ + period <= image;
+  return expected && until < image + period && image - last_middle_ < 3 * period;
 }
 
 void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& out) {
@@ -54,7 +74,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   LidarConfig lidar = config_.lidar;
   // With hysteresis: each change of mind would hand what was drifted since to the map.
   constexpr double to_leave = 3.0;
-  if (degenerate_) lidar.weak_share *= to_leave;
+  if (!weak_.isZero(0)) lidar.weak_share *= to_leave;
   LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar, workers_);
   const PoseCovariance within_scan = undistortion_noise(config_.noise, end - centre);
   const auto measured = [&](const State& x, const Covariance& P) {
@@ -71,11 +91,11 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   const SE3 T_WI = estimate_->x.pose();
   if (good) {
     trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
-    map_error_.registered(T_WI, model.by_epoch(), weak_part(model.report().degeneracy));
+    weak_ = weak_part(model.report().degeneracy);
+    map_error_.registered(T_WI, model.by_epoch(), weak_);
     const std::uint32_t epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
     map_.insert(to_world(clusters, T_WI, p_IL, config_.lidar), epoch);
     map_.forget(estimate_->x.p);
-    degenerate_ = model.report().degeneracy.weak_count > 0;
     settle(*estimate_);
   }
   stages.map_us = watch.lap_us();
@@ -89,6 +109,8 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   sweep.is_sweep = true;
   sweep.registration = model.report();
   sweep.points_W = in_world(points, T_WI);
+  if (uses(Sensor::camera)) seen_W_ = sweep.points_W;
+  last_middle_ = centre;
   sweep.stages = stages;
   sweep.stages.other_us = watch.lap_us();
   // While the legs are used it goes out with the next of their samples, which is not earlier than those that have gone.

@@ -14,6 +14,7 @@ namespace kilvo {
 
 struct UpdateConfig {
   int max_iterations = 5;
+  int min_iterations = 1;         // of a model that is coarse at first; no setting
   double rotation_step = 5e-5;  // rad
   double position_step = 2e-4;  // m
 
@@ -70,7 +71,7 @@ Update update(const Estimate& prior, Model&& model, const UpdateConfig& config) 
     e = boxminus(x, prior.x);
     out.iterations = k;
     out.rows = static_cast<int>(count);
-    out.converged = d.segment<3>(at::R).norm() < config.rotation_step && d.segment<3>(at::p).norm() < config.position_step;
+    out.converged = k >= config.min_iterations && d.segment<3>(at::R).norm() < config.rotation_step && d.segment<3>(at::p).norm() < config.position_step;
     if (out.converged || k == config.max_iterations) {
       out.posterior.P = P;
       out.posterior.P.template selfadjointView<Eigen::Lower>().rankUpdate(W, -1.0);

@@ -21,8 +21,8 @@ struct GreyImage {
 /// Grey from red, green, blue (ITU-R BT.601 weights), or the grey image itself.
 GreyImage to_grey(const Image& image);
 
-/// Half the size (rounded down), low-passed by the separable binomial filter 1 3 3 1 between the pixels, repeated at the borders: pixel u of the half
-/// image lies at 2u + 0.5 of the whole one.
+/// Half the size (rounded down), low-passed by the separable binomial filter 1 3 3 1 between the pixels, repeated at the borders: pixel u
+/// of the half image lies at 2u + 0.5 of the whole one.
 GreyImage half_of(const GreyImage& image);
 
 /// Level 0 is the image itself. A level is not made when it would be smaller than 16 pixels.

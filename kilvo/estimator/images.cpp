@@ -1,0 +1,105 @@
+// The visual part of the sequential phase: an image updates the state at its own time; what came since is replayed.
+#include <algorithm>
+#include <cmath>
+
+#include "kilvo/estimator/estimator.hpp"
+#include "kilvo/estimator/stopwatch.hpp"
+#include "kilvo/filter/pose_error.hpp"
+#include "kilvo/vision/depth_view.hpp"
+#include "kilvo/vision/new_points.hpp"
+
+namespace kilvo {
+namespace {
+
+// A view that differs so much from those that a point has is kept as well: octaves of scale, rad.
+constexpr double new_scale = 0.4, new_angle = 0.25;
+
+bool is_new_view(const Track& track) {
+  const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(track.A.determinant()))));
+  return octaves > new_scale || track.view_angle > new_angle;
+}
+
+}  // namespace
+
+// What makes an image no use at all; nullptr: nothing.
+const char* Estimator::image_fault(const CameraImage& image) {
+  const Image& picture = image.image;
+  if (picture.empty()) return "empty";
+  if (picture.width != robot_.camera.width || picture.height != robot_.camera.height) return "another size than configured";
+  if (picture.pixels == picture_) return "the same picture again";
+  picture_ = picture.pixels;
+  return nullptr;
+}
+
+void Estimator::process(const CameraImage& image) {
+  if (image.t < anchor_.t) return drop(Sensor::camera, "before the state");
+  if (seen_W_.empty()) return drop(Sensor::camera, "before the first sweep");
+  Stopwatch watch;
+  const std::vector<GreyImage> pyramid = pyramid_of(to_grey(image.image), Patch::levels);
+  Estimate prior = anchor_;
+  replay_.advance(prior, image.t, trajectory_);
+  const SE3 expected = T_CI_ * prior.x.pose().inverse();
+  const DepthView depth(*camera_, expected, seen_W_);
+  const std::vector<Track> tracks = select_tracks(visual_map_, *camera_, expected, depth, config_.vision);
+  PhotometricModel model(visual_map_, *camera_, T_CI_, pyramid, tracks, prior, config_.vision);
+  if (const auto tau = model.exposure_at(prior.x)) {
+    // Lamps are switched and exposures jump: what it was says nothing, the image all.
+    constexpr double unsure = 0.1;
+    prior.x.tau = *tau;
+    prior.P.row(at::tau).setZero();
+    prior.P.col(at::tau).setZero();
+    prior.P(at::tau, at::tau) = unsure * unsure * *tau * *tau;
+  }
+  UpdateConfig update_config = config_.update;
+  update_config.min_iterations = model.iterations();
+  update_config.max_iterations = std::max(update_config.max_iterations, model.iterations() + 2);
+  estimate_ = tracks.empty() ? prior : update(prior, model, update_config).posterior;
+  ++statistics_.sensors[static_cast<std::size_t>(Sensor::camera)].used;
+  if (!keep_finite()) return;
+  trajectory_.correct(image.t, estimate_->x.pose(), estimate_->x.v - prior.x.v);
+  learn_from(model, tracks, pyramid, depth);
+  settle(*estimate_);
+  last_image_ = image.t;
+}
+
+void Estimator::learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,
+                           const DepthView& depth) {
+  const SE3 T_WI = estimate_->x.pose();
+  const SE3 T_CW = T_CI_ * T_WI.inverse();
+  VisualFrame frame;
+  frame.T_CW = T_CW;
+  frame.tau = estimate_->x.tau;
+  frame.epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
+  // Along what the LiDAR does not know, the error of this frame is that of the next ones: drift, which the epoch carries.
+  const PoseCovariance own = to_origin(T_WI) * (PoseCovariance::Identity() - weak_);
+  frame.noise.topLeftCorner<6, 6>() = own * estimate_->P.topLeftCorner<6, 6>() * own.transpose();
+  frame.noise(6, 6) = estimate_->P(at::tau, at::tau);
+  const std::uint32_t id = visual_map_.add_frame(frame);
+  const auto view = [&](const Eigen::Vector2d& pixel) -> std::optional<Observation> {
+    const auto patch = cut_patch(pyramid, pixel);
+    if (!patch) return std::nullopt;
+    return Observation{id, pixel.cast<float>(), 1.0F, *patch};
+  };
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const Track& track = tracks[i];
+    const PhotometricModel::Verdict& verdict = model.verdicts()[i];
+    if (verdict.used) {
+      VisualPoint point = visual_map_.point(track.point);
+      const SE3& first = visual_map_.frame(visual_map_.observation(point.observations[0]).frame).T_CW;
+      if (lay_on_plane(map_, -(first.R.inverse() * first.p), point))
+        visual_map_.refresh(track.point, point.p_W, point.normal_W, point.variance, point.node);
+      const auto pixel = camera_->project(T_CW * point.p_W);
+      if (is_new_view(track) && pixel && camera_->sees(*pixel, 20)) {
+        if (const auto seen = view(*pixel)) visual_map_.observe(track.point, *seen);
+      }
+    }
+    visual_map_.judge(track.point, track.observation, verdict.used, verdict.correlation);
+  }
+  for (const NewPoint& found : new_points(map_, *camera_, T_CW, pyramid[0], depth, tracks, config_.vision)) {
+    if (const auto seen = view(found.pixel)) visual_map_.insert(found.point, *seen);
+  }
+  visual_map_.forget_unused_frame(id);
+  visual_map_.forget(estimate_->x.p, config_.map.radius);
+}
+
+}  // namespace kilvo

@@ -1,0 +1,26 @@
+// A pose error (rotation in the body, position in the world; state.hpp) as a twist of the world at its origin, and back. Errors that poses
+// far apart have in common are the same twist.
+#pragma once
+
+#include "kilvo/filter/state.hpp"
+
+namespace kilvo {
+
+/// (theta in the body, error of p) -> twist: phi = R theta, u = dp + p x phi.
+inline PoseCovariance to_origin(const SE3& T_WI) {
+  PoseCovariance G = PoseCovariance::Zero();
+  G.topLeftCorner<3, 3>() = T_WI.R.matrix();
+  G.bottomLeftCorner<3, 3>() = skew(T_WI.p) * T_WI.R.matrix();
+  G.bottomRightCorner<3, 3>().setIdentity();
+  return G;
+}
+
+inline PoseCovariance from_origin(const SE3& T_WI) {
+  PoseCovariance G = PoseCovariance::Zero();
+  G.topLeftCorner<3, 3>() = T_WI.R.matrix().transpose();
+  G.bottomLeftCorner<3, 3>() = -skew(T_WI.p);
+  G.bottomRightCorner<3, 3>().setIdentity();
+  return G;
+}
+
+}  // namespace kilvo

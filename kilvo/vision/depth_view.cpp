@@ -1,0 +1,87 @@
+#include "kilvo/vision/depth_view.hpp"
+
+#include <algorithm>
+
+namespace kilvo {
+namespace {
+
+// In front: by more than the LiDAR's noise and what a grazing plane bends.
+constexpr double in_front_share = 0.02, in_front_least = 0.08;  // of the depth; m
+// Nearer than this the camera sees blur and the robot itself.
+constexpr float least_depth = 0.2F;  // m
+
+// Bounds of x/z and y/z that the image can hold, so that most points need no distortion.
+struct Window {
+  float left = 0, right = 0, top = 0, bottom = 0;
+
+  void take(const Eigen::Vector3d& ray) {
+    const Eigen::Vector3f r = ray.cast<float>();
+    left = std::min(left, r.x());
+    right = std::max(right, r.x());
+    top = std::min(top, r.y());
+    bottom = std::max(bottom, r.y());
+  }
+  bool holds(const Eigen::Vector3f& p) const {
+    return p.x() >= left * p.z() && p.x() <= right * p.z() && p.y() >= top * p.z() && p.y() <= bottom * p.z();
+  }
+};
+
+Window window_of(const Camera& camera) {
+  Window window;
+  const double w = camera.width() - 1, h = camera.height() - 1;
+  constexpr int steps = 16;
+  for (int k = 0; k <= steps; ++k) {
+    const double s = static_cast<double>(k) / steps;
+    for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(s * w, 0), Eigen::Vector2d(s * w, h), Eigen::Vector2d(0, s * h), Eigen::Vector2d(w, s * h)}) {
+      if (const auto ray = camera.unproject(pixel)) window.take(*ray);
+    }
+  }
+  return window;
+}
+
+}  // namespace
+
+DepthView::DepthView(const Camera& camera, const SE3& T_CW, std::span<const Eigen::Vector4f> points_W)
+    : points_W_(points_W),
+      columns_(camera.width() / cell + 1),
+      rows_(camera.height() / cell + 1),
+      nearest_(static_cast<std::size_t>(columns_ * rows_), none) {
+  const Window window = window_of(camera);
+  const Eigen::Matrix3f R = T_CW.R.matrix().cast<float>();
+  const Eigen::Vector3f t = T_CW.p.cast<float>();
+  for (std::uint32_t i = 0; i < points_W.size(); ++i) {
+    const Eigen::Vector3f p_C = R * points_W[i].head<3>() + t;
+    if (p_C.z() < least_depth || !window.holds(p_C)) continue;
+    const auto pixel = camera.project(p_C.cast<double>());
+    if (!pixel || !camera.sees(*pixel, 0)) continue;
+    const auto at = static_cast<std::size_t>(static_cast<int>(pixel->y()) / cell * columns_ + static_cast<int>(pixel->x()) / cell);
+    std::uint32_t& nearest = nearest_[at];
+    if (nearest == none || p_C.z() < seen_[nearest].depth) nearest = static_cast<std::uint32_t>(seen_.size());
+    seen_.push_back({i, pixel->cast<float>(), p_C.z()});
+  }
+}
+
+template <class F>
+bool DepthView::any_around(const Eigen::Vector2d& pixel, F&& f) const {
+  const int x = static_cast<int>(pixel.x()) / cell, y = static_cast<int>(pixel.y()) / cell;
+  for (int j = std::max(0, y - 1); j <= std::min(rows_ - 1, y + 1); ++j) {
+    for (int i = std::max(0, x - 1); i <= std::min(columns_ - 1, x + 1); ++i) {
+      const std::uint32_t nearest = nearest_[static_cast<std::size_t>(j * columns_ + i)];
+      if (nearest != none && f(seen_[nearest])) return true;
+    }
+  }
+  return false;
+}
+
+bool DepthView::hides(const Eigen::Vector2d& pixel, const Eigen::Vector3d& p_W, const Eigen::Vector3d& n_W, double depth) const {
+  const double limit = in_front_least + in_front_share * depth;
+  return any_around(pixel, [&](const Seen& s) { return static_cast<double>(s.depth) < depth && n_W.dot(point(s) - p_W) > limit; });
+}
+
+bool DepthView::shows(const Seen& s) const {
+  constexpr float share = 0.1F;
+  const float limit = s.depth * (1 - share) - static_cast<float>(in_front_least);
+  return !any_around(s.pixel.cast<double>(), [limit](const Seen& other) { return other.depth < limit; });
+}
+
+}  // namespace kilvo

@@ -1,0 +1,39 @@
+// Small pieces of images: cut, judged, and turned into what another view should show.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "kilvo/map/visual_map.hpp"
+#include "kilvo/vision/pyramid.hpp"
+
+namespace kilvo {
+
+/// The levels around a pixel of level 0. Levels that would reach outside the image are left out; none at all when level 0 does.
+std::optional<Patch> cut_patch(std::span<const GreyImage> pyramid, const Eigen::Vector2d& pixel);
+
+/// Smaller eigenvalue of the scatter of the gradient in the 8x8 pixels around one, per pixel (Shi and Tomasi 1994); 0 near the border.
+float corner_of(const GreyImage& image, int x, int y);
+
+/// What a view of a patch should look like at one level: values, and their gradient by the pixel of that level, at 8x8 pixels.
+struct Template {
+  static constexpr int size = 8;
+  static constexpr int count = size * size;
+
+  std::array<float, count> value, dx, dy;
+};
+
+/// The patch seen through `A` (pixels of the patch's image by pixels of the view, both of level 0), at a level of the view; from the level of
+/// the patch that is nearest in scale. None when the scales do not fit, or the patch is too small.
+std::optional<Template> warp(const Observation& from, const Eigen::Matrix2d& A, int level);
+
+/// The 8x8 pixels of a view around a pixel of its own level, which must be at least 5 px within.
+void sample_patch(const GreyImage& image, const Eigen::Vector2f& centre, std::array<float, Template::count>& out);
+
+/// Correlation of two patches, each less its mean; 0 when one is flat.
+float correlation(const std::array<float, Template::count>& a, const std::array<float, Template::count>& b);
+
+}  // namespace kilvo

@@ -1,0 +1,268 @@
+#include "kilvo/vision/photometric.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "kilvo/filter/pose_error.hpp"
+
+namespace kilvo {
+namespace {
+
+// Beyond this many standard deviations the pull of a patch stays the same (Huber).
+constexpr double robust_sigmas = 1.5;
+// Pixels a patch needs around it at its level.
+constexpr double border = 5;
+// Brighter pixels are taken as saturated.
+constexpr float bright = 252;
+// An expected error of so many pixels is within reach of the finest level; twice that of the next.
+constexpr double reach = 0.7;
+
+using Values = std::array<float, Template::count>;
+
+PatchSums sums_of(const Template& patch, const Values& image, double tau, double tau_patch, double bias_variance, double variance) {
+  const auto t = static_cast<float>(tau), tp = static_cast<float>(tau_patch);
+  // Of the image: gradient and value come from the patch, so that they stay the same from iterate to iterate.
+  float xx = 0, xy = 0, yy = 0, xi = 0, yi = 0, ii = 0, sx = 0, sy = 0, si = 0, xr = 0, yr = 0, ir = 0, sr = 0, rr = 0, top = 0;
+  const float per_tau = tp / t;
+  for (std::size_t k = 0; k < Template::count; ++k) {
+    const float x = tp * patch.dx[k], y = tp * patch.dy[k], i = per_tau * patch.value[k];
+    const float r = t * image[k] - tp * patch.value[k];
+    xx += x * x;
+    xy += x * y;
+    yy += y * y;
+    xi += x * i;
+    yi += y * i;
+    ii += i * i;
+    sx += x;
+    sy += y;
+    si += i;
+    xr += x * r;
+    yr += y * r;
+    ir += i * r;
+    sr += r;
+    rr += r * r;
+    top = std::max(top, std::max(image[k], patch.value[k]));
+  }
+  constexpr double n = Template::count;
+  PatchSums out;
+  out.saturated = top > bright;
+  const Eigen::Vector3d s(static_cast<double>(sx), static_cast<double>(sy), static_cast<double>(si));
+  out.A << static_cast<double>(xx), static_cast<double>(xy), static_cast<double>(xi), static_cast<double>(xy), static_cast<double>(yy),
+      static_cast<double>(yi), static_cast<double>(xi), static_cast<double>(yi), static_cast<double>(ii);
+  out.b << static_cast<double>(xr), static_cast<double>(yr), static_cast<double>(ir);
+  const double pixels = n + variance / bias_variance;
+  out.A -= s * s.transpose() / pixels;
+  out.b -= s * static_cast<double>(sr) / pixels;
+  out.mean_square = (static_cast<double>(rr) - static_cast<double>(sr) * static_cast<double>(sr) / n) / (n - 1);
+  return out;
+}
+
+float mean_of(const Values& values) {
+  float sum = 0;
+  for (const float v : values) sum += v;
+  return sum / Template::count;
+}
+
+double median_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+std::optional<PatchView> view_of(const Camera& camera, const SE3& T_CI, const SE3& T_WI, const Eigen::Vector3d& p_W) {
+  const Eigen::Matrix3d R_IW = T_WI.R.matrix().transpose();
+  const Eigen::Vector3d p_I = R_IW * (p_W - T_WI.p);
+  const auto seen = camera.project_with_jacobian(T_CI * p_I);
+  if (!seen) return std::nullopt;
+  PatchView out;
+  out.pixel = seen->pixel;
+  const Eigen::Matrix<double, 2, 3> J_I = seen->J * T_CI.R.matrix();
+  out.J_point = J_I * R_IW;
+  out.J.leftCols<3>() = J_I * skew(p_I);
+  out.J.rightCols<3>() = -out.J_point;
+  return out;
+}
+
+PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, const SE3& T_CI, std::span<const GreyImage> pyramid,
+                                   std::span<const Track> tracks, const Estimate& prior, const VisionConfig& config)
+    : map_(map),
+      camera_(camera),
+      T_CI_(T_CI),
+      pyramid_(pyramid),
+      tracks_(tracks),
+      config_(config),
+      prepared_(tracks.size()),
+      verdicts_(tracks.size()) {
+  report_.tracks = static_cast<int>(tracks.size());
+  std::map<std::uint32_t, int> patches_of_node;
+  for (const Track& t : tracks) ++patches_of_node[map.point(t.point).node];
+  const PoseCovariance P = prior.P.topLeftCorner<6, 6>();
+  std::vector<double> spread2;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const VisualPoint& point = map.point(tracks[i].point);
+    const Observation& o = map.observation(tracks[i].observation);
+    const VisualFrame& frame = map.frame(o.frame);
+    Prepared& p = prepared_[i];
+    p.p_W = point.p_W;
+    p.tau = frame.tau;
+    p.frame = o.frame;
+    p.depth_variance = static_cast<double>(point.variance) * patches_of_node[point.node];
+    const Eigen::Vector3d ray = point.p_W + frame.T_CW.R.inverse() * frame.T_CW.p;
+    p.slide_W = ray / point.normal_W.cast<double>().dot(ray);
+    if (const auto view = view_of(camera, T_CI, prior.x.pose(), p.p_W)) spread2.push_back((view->J * P * view->J.transpose()).trace());
+  }
+  const double spread = spread2.empty() ? 0 : std::sqrt(median_of(spread2));
+  int coarsest = 0;
+  while (coarsest + 1 < std::min<int>(Patch::levels, static_cast<int>(pyramid.size())) && spread > reach * (1 << coarsest)) ++coarsest;
+  for (int level = coarsest; level >= 0; --level) schedule_.push_back(level);
+}
+
+void PhotometricModel::prepare(int level) {
+  if (level == level_) return;
+  level_ = level;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) prepared_[i].patch = warp(map_.observation(tracks_[i].observation), tracks_[i].A, level);
+}
+
+PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x) {
+  Part out;
+  const Prepared& p = prepared_[i];
+  Verdict& verdict = verdicts_[i];
+  verdict = {};
+  if (!p.patch) return out;
+  const auto view = view_of(camera_, T_CI_, x.pose(), p.p_W);
+  if (!view) return out;
+  const GreyImage& image = pyramid_[static_cast<std::size_t>(level_)];
+  const Eigen::Vector2d at = at_level(view->pixel, level_);
+  if (at.x() < border || at.y() < border || at.x() > image.width - 1 - border || at.y() > image.height - 1 - border) return out;
+  Values seen;
+  sample_patch(image, at.cast<float>(), seen);
+  verdict.correlation = correlation(seen, p.patch->value);
+  const auto brightness = static_cast<double>(mean_of(p.patch->value));
+  const auto pixel_variance = [&](double tau, double grey) {
+    return tau * tau * (config_.read_noise * config_.read_noise + config_.shot_noise * grey);
+  };
+  out.expected_variance = pixel_variance(x.tau, brightness * p.tau / x.tau) + pixel_variance(p.tau, brightness);
+  const double bias = config_.bias_share * p.tau * brightness + 1e-3;
+  out.view = *view;
+  out.sums = sums_of(*p.patch, seen, x.tau, p.tau, bias * bias, out.expected_variance);
+  out.valid = !out.sums.saturated && static_cast<double>(verdict.correlation) > config_.min_correlation;
+  return out;
+}
+
+// A patch that is found farther from its place than pose, depth and frame explain is something else that looks alike.
+bool PhotometricModel::gate(const Part& part, const Eigen::Matrix3d& M, const Eigen::Vector3d& b, const PoseCovariance& P,
+                            const Eigen::Matrix2d& shift) const {
+  if (!(M(2, 2) > 0)) return false;
+  const Eigen::Matrix2d A = M.topLeftCorner<2, 2>() - M.topRightCorner<2, 1>() * M.bottomLeftCorner<1, 2>() / M(2, 2);
+  const Eigen::Vector2d h = b.head<2>() - M.topRightCorner<2, 1>() * b[2] / M(2, 2);
+  if (!(A.determinant() > 0)) return false;
+  const Eigen::Matrix2d variance = A.inverse();
+  const Eigen::Vector2d displacement = variance * h;
+  const Eigen::Matrix2d S = variance + shift + part.view.J * P * part.view.J.transpose();
+  return displacement.dot(S.inverse() * displacement) < config_.gate * config_.gate;
+}
+
+void PhotometricModel::add(std::size_t i, const Part& part, double scale2, const State& x, const Covariance& prior) {
+  const Prepared& p = prepared_[i];
+  const double zoom = 1.0 / (1 << level_);
+  // A patch that differs more than the others do is worse than they are.
+  const double variance = std::max(scale2 * part.expected_variance, part.sums.mean_square);
+  Eigen::Matrix3d M = part.sums.A / variance;
+  Eigen::Vector3d b = part.sums.b / variance;
+  // From pixels of the level to those of level 0.
+  const Eigen::Vector3d unit(zoom, zoom, 1);
+  M = (unit.asDiagonal() * M * unit.asDiagonal()).eval();
+  b = unit.cwiseProduct(b).eval();
+  const Eigen::Vector2d slide = part.view.J_point * p.slide_W;
+  Eigen::Matrix2d shift = p.depth_variance * slide * slide.transpose();
+  shift.diagonal().array() += config_.pixel_error * config_.pixel_error;
+  const VisualFrame& frame = map_.frame(p.frame);
+  const PoseCovariance G = from_origin(x.pose());
+  const PoseCovariance P = prior.topLeftCorner<6, 6>() + G * frame.noise.topLeftCorner<6, 6>() * G.transpose();
+  if (!gate(part, M, b, P, shift)) {
+    verdicts_[i].moved = true;
+    ++report_.moved;
+    return;
+  }
+  // Noise of the patch's place: (I + M V)^-1 M.
+  Eigen::Matrix3d common = Eigen::Matrix3d::Identity();
+  common.leftCols<2>() += M.leftCols<2>() * shift;
+  const Eigen::Matrix3d inverse = common.inverse();
+  M = (inverse * M).eval();
+  M = (0.5 * (M + M.transpose())).eval();
+  b = (inverse * b).eval();
+  const double z = M.determinant() > 0 ? std::sqrt(b.dot(M.inverse() * b) / 2) : 0;
+  const double weight = z > robust_sigmas ? robust_sigmas / z : 1;
+  Eigen::Matrix<double, 3, 7> J = Eigen::Matrix<double, 3, 7>::Zero();
+  J.topLeftCorner<2, 6>() = part.view.J;
+  J(2, 6) = 1;
+  auto group = std::find_if(groups_.begin(), groups_.end(), [&](const Group& g) { return g.frame == p.frame; });
+  if (group == groups_.end()) group = groups_.insert(groups_.end(), Group{p.frame, {}});
+  group->info.A += weight * J.transpose() * M * J;
+  group->info.b += weight * J.transpose() * b;
+  group->info.chi2 += weight * b.dot(M.inverse() * b);
+  ++group->info.rows;
+  verdicts_[i].used = true;
+}
+
+Information<7> PhotometricModel::operator()(const State& x, const Covariance& prior) {
+  prepare(schedule_[std::min(call_++, schedule_.size() - 1)]);
+  report_.used = report_.moved = report_.unlike = 0;
+  std::vector<Part> parts(tracks_.size());
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    parts[i] = evaluate(i, x);
+    if (parts[i].valid) ratios.push_back(parts[i].sums.mean_square / parts[i].expected_variance);
+    if (!parts[i].valid && prepared_[i].patch && !parts[i].sums.saturated) ++report_.unlike;
+  }
+  // Noise of the pixels that nobody configured: of the whole image.
+  const double scale2 = ratios.empty() ? 1 : std::max(1.0, median_of(ratios));
+  report_.noise = std::sqrt(scale2);
+  groups_.clear();
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    if (parts[i].valid) add(i, parts[i], scale2, x, prior);
+  }
+  Information<7> total;
+  total.columns = {at::R, at::R + 1, at::R + 2, at::p, at::p + 1, at::p + 2, at::tau};
+  by_frame_.clear();
+  Eigen::Matrix<double, 7, 7> G = Eigen::Matrix<double, 7, 7>::Identity();
+  G.topLeftCorner<6, 6>() = from_origin(x.pose());
+  for (Group& group : groups_) {
+    const VisualFrame& frame = map_.frame(group.frame);
+    // The exposure of the frame scales what it says of this one's.
+    G(6, 6) = x.tau / frame.tau;
+    add_common_noise<7>(G * frame.noise * G.transpose(), group.info);
+    total.A += group.info.A;
+    total.b += group.info.b;
+    total.chi2 += group.info.chi2;
+    total.rows += group.info.rows;
+    by_frame_.push_back({frame.epoch, group.info.A.topLeftCorner<6, 6>()});
+  }
+  report_.used = total.rows;
+  return total;
+}
+
+std::optional<double> PhotometricModel::exposure_at(const State& x) const {
+  constexpr std::size_t enough = 8;
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    const Prepared& p = prepared_[i];
+    const auto view = view_of(camera_, T_CI_, x.pose(), p.p_W);
+    if (!view || !camera_.sees(view->pixel, 2 * border)) continue;
+    const auto patch = warp(map_.observation(tracks_[i].observation), tracks_[i].A, 0);
+    if (!patch) continue;
+    Values seen;
+    sample_patch(pyramid_[0], view->pixel.cast<float>(), seen);
+    const float here = mean_of(seen), there = mean_of(patch->value);
+    constexpr float dark = 8, light = 240;
+    if (here > dark && here < light && there > dark && there < light) ratios.push_back(p.tau * static_cast<double>(there / here));
+  }
+  if (ratios.size() < enough) return std::nullopt;
+  return median_of(ratios);
+}
+
+}  // namespace kilvo

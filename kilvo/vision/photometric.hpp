@@ -1,0 +1,113 @@
+// The visual measurement (paper, Eq. 12): patches of the visual map against the image, directly by their grey values, with the inverse
+// exposure time as a state. The pixels of one patch are summed into what they say of its place in the image and of the exposure; only then does the
+// pose enter, so that what is uncertain about a patch as a whole (depth, calibration) is noise of the patch, not of each pixel.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "kilvo/filter/measurement_rows.hpp"
+#include "kilvo/map/visual_map.hpp"
+#include "kilvo/vision/camera.hpp"
+#include "kilvo/vision/patches.hpp"
+#include "kilvo/vision/select_tracks.hpp"
+#include "kilvo/vision/vision_config.hpp"
+
+namespace kilvo {
+
+/// One patch at one iterate: where it is seen and how that moves with the pose.
+struct PatchView {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();                              // level 0
+  Eigen::Matrix<double, 2, 6> J = Eigen::Matrix<double, 2, 6>::Zero();          // by (rotation, position), px/rad and px/m
+  Eigen::Matrix<double, 2, 3> J_point = Eigen::Matrix<double, 2, 3>::Zero();    // by the point in the world, px/m
+};
+
+/// Where a point of the world is seen from a pose of the IMU, and the derivatives; none when it is not.
+std::optional<PatchView> view_of(const Camera& camera, const SE3& T_CI, const SE3& T_WI, const Eigen::Vector3d& p_W);
+
+/// r = tau I(u) - tau_r T, summed over the pixels of a patch: A = sum h h', b = sum h r over h = dr/d(u, v, tau), less what the brightness of the
+/// patch may have changed by itself.
+struct PatchSums {
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  double mean_square = 0;  // of r, less its mean
+  bool saturated = false;
+};
+
+class PhotometricModel {
+ public:
+  struct Verdict {
+    bool used = false;
+    bool moved = false;  // found, but not where it should be
+    float correlation = 0;
+  };
+  struct Report {
+    int tracks = 0, used = 0, moved = 0, unlike = 0;
+    double noise = 1;  // of the pixels, times what was expected (standard deviation)
+  };
+  struct FrameInformation {
+    std::uint32_t epoch = 0;
+    Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
+  };
+
+  /// Keeps references: the map, the camera, the pyramid and the tracks must outlive it. `prior`: of the pose before the image; it says how
+  /// coarsely to begin.
+  PhotometricModel(const VisualMap& map, const Camera& camera, const SE3& T_CI, std::span<const GreyImage> pyramid,
+                   std::span<const Track> tracks, const Estimate& prior, const VisionConfig& config);
+
+  Information<7> operator()(const State& x, const Covariance& prior);
+
+  /// How often it must be called to be at the finest level.
+  int iterations() const { return static_cast<int>(schedule_.size()); }
+
+  /// The inverse exposure that makes the image as bright as the patches: a median. None with too few of them.
+  std::optional<double> exposure_at(const State& x) const;
+
+  // Of the last evaluation:
+  const std::vector<Verdict>& verdicts() const { return verdicts_; }
+  const Report& report() const { return report_; }
+  const std::vector<FrameInformation>& by_frame() const { return by_frame_; }
+
+ private:
+  struct Prepared {
+    Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
+    Eigen::Vector3d slide_W = Eigen::Vector3d::Zero();  // how the point moves along its first ray when the surface moves along its normal
+    double depth_variance = 0;                          // of the surface, shared by all patches on it
+    double tau = 1;                                     // of the observation's frame
+    std::uint32_t frame = 0;
+    std::optional<Template> patch;
+  };
+  struct Part {
+    PatchView view;
+    PatchSums sums;
+    double expected_variance = 1;  // of a pixel's r
+    bool valid = false;
+  };
+  void prepare(int level);
+  Part evaluate(std::size_t i, const State& x);
+  bool gate(const Part& part, const Eigen::Matrix3d& M, const Eigen::Vector3d& b, const PoseCovariance& P, const Eigen::Matrix2d& shift) const;
+  void add(std::size_t i, const Part& part, double scale2, const State& x, const Covariance& prior);
+
+  const VisualMap& map_;
+  const Camera& camera_;
+  SE3 T_CI_;
+  std::span<const GreyImage> pyramid_;
+  std::span<const Track> tracks_;
+  VisionConfig config_;
+  std::vector<int> schedule_;
+  std::size_t call_ = 0;
+  int level_ = -1;
+  std::vector<Prepared> prepared_;
+  std::vector<Verdict> verdicts_;
+  Report report_;
+  struct Group {
+    std::uint32_t frame = 0;
+    Information<7> info;
+  };
+  std::vector<Group> groups_;
+  std::vector<FrameInformation> by_frame_;
+};
+
+}  // namespace kilvo

@@ -1,0 +1,113 @@
+#include "kilvo/vision/select_tracks.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace kilvo {
+namespace {
+
+// Pixels that a patch needs around it, at level 0.
+constexpr double border = 10;
+// Surfaces seen at a flatter angle than this (its sine) are no use.
+constexpr double grazing = 0.12;
+// Views that differ by more show another picture, rad.
+constexpr double most_turned = 0.7;
+
+std::vector<VoxelKey> voxels_in_view(const VisualMap& map, const DepthView& depth) {
+  std::vector<VoxelKey> keys;
+  keys.reserve(depth.seen().size());
+  for (const DepthView::Seen& s : depth.seen()) keys.push_back(map.key_of(depth.point(s)));
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  return keys;
+}
+
+struct View {
+  const VisualMap& map;
+  const Camera& camera;
+  const SE3& T_CW;
+  Eigen::Vector3d eye_W;
+};
+
+// The observation whose view is most like this one; of those that are alike, the oldest, which has drifted least.
+bool choose_observation(const View& view, const VisualPoint& p, Track& track) {
+  constexpr double alike_scale = 0.25, alike_angle = 0.2;  // octaves, rad
+  const Eigen::Vector3d n = p.normal_W.cast<double>();
+  const Eigen::Vector3d towards = (view.eye_W - p.p_W).normalized();
+  double best = 1e9;
+  for (std::size_t k = 0; k < p.count; ++k) {
+    const Observation& o = view.map.observation(p.observations[k]);
+    const SE3& T_RW = view.map.frame(o.frame).T_CW;
+    const Eigen::Vector3d from = (-(T_RW.R.inverse() * T_RW.p) - p.p_W).normalized();
+    const double angle = std::acos(std::clamp(from.dot(towards), -1.0, 1.0));
+    if (angle > most_turned) continue;
+    const auto A = affine_between(view.camera, view.T_CW, T_RW, p.p_W, n);
+    if (!A) continue;
+    const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(A->determinant()))));
+    const double unlike = std::max(0.0, octaves - alike_scale) + std::max(0.0, angle - alike_angle) + 2 * (1 - static_cast<double>(o.agreement));
+    if (unlike < best) {
+      best = unlike;
+      track.observation = p.observations[k];
+      track.A = *A;
+      track.view_angle = angle;
+    }
+  }
+  return best < 1e9;
+}
+
+}  // namespace
+
+std::optional<Eigen::Matrix2d> affine_between(const Camera& camera, const SE3& T_CW, const SE3& T_RW, const Eigen::Vector3d& p_W,
+                                              const Eigen::Vector3d& n_W) {
+  const auto here = camera.project_with_jacobian(T_CW * p_W), there = camera.project_with_jacobian(T_RW * p_W);
+  if (!here || !there) return std::nullopt;
+  Eigen::Matrix<double, 3, 2> along;  // the plane
+  along.col(0) = n_W.unitOrthogonal();
+  along.col(1) = n_W.cross(along.col(0));
+  const Eigen::Matrix2d B = here->J * T_CW.R.matrix() * along;
+  constexpr double edge_on = 1e-3;  // px^2/m^2
+  if (std::abs(B.determinant()) < edge_on) return std::nullopt;
+  return Eigen::Matrix2d(there->J * T_RW.R.matrix() * along * B.inverse());
+}
+
+std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,
+                                 const VisionConfig& config) {
+  const View view{map, camera, T_CW, T_CW.inverse().p};
+  const CellGrid grid(camera, config.cell);
+  struct Best {
+    double worth = 0;
+    std::uint32_t point = 0;
+    Eigen::Vector2d pixel;
+  };
+  std::vector<Best> cells(grid.size());
+  for (const VoxelKey key : voxels_in_view(map, depth)) {
+    map.visit(key, [&](std::uint32_t id, const VisualPoint& p) {
+      const Eigen::Vector3d p_C = T_CW * p.p_W;
+      const auto pixel = camera.project(p_C);
+      if (!pixel || !camera.sees(*pixel, border)) return;
+      Best& best = cells[grid.of(*pixel)];
+      // Those that have proven themselves first.
+      const double worth = static_cast<double>(p.corner) * (1.0 + std::min<int>(p.seen, 10)) / (1.0 + p.failed);
+      if (worth <= best.worth) return;
+      const Eigen::Vector3d n = p.normal_W.cast<double>();
+      const Eigen::Vector3d towards = view.eye_W - p.p_W;
+      const double facing = n.dot(towards);
+      if (std::abs(facing) < grazing * towards.norm()) return;
+      if (depth.hides(*pixel, p.p_W, facing > 0 ? n : Eigen::Vector3d(-n), p_C.z())) return;
+      best = {worth, id, *pixel};
+    });
+  }
+  std::vector<Track> tracks;
+  for (const Best& best : cells) {
+    if (best.worth <= 0) continue;
+    Track track;
+    track.point = best.point;
+    track.pixel = best.pixel;
+    if (choose_observation(view, map.point(best.point), track)) tracks.push_back(track);
+  }
+  return tracks;
+}
+
+}  // namespace kilvo

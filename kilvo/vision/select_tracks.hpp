@@ -1,0 +1,47 @@
+// Which points of the visual map an image should be held against: one in each cell of the image, not hidden, seen from a similar view.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "kilvo/map/visual_map.hpp"
+#include "kilvo/vision/camera.hpp"
+#include "kilvo/vision/depth_view.hpp"
+#include "kilvo/vision/vision_config.hpp"
+
+namespace kilvo {
+
+struct Track {
+  std::uint32_t point = 0;
+  std::uint32_t observation = 0;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();      // where it is expected
+  Eigen::Matrix2d A = Eigen::Matrix2d::Identity();      // pixels of the observation's image by pixels of this one
+  double view_angle = 0;                                // between the two views of the point, rad
+};
+
+/// The grid of cells of the image.
+class CellGrid {
+ public:
+  CellGrid(const Camera& camera, int cell)
+      : cell_(cell), columns_((camera.width() + cell - 1) / cell), rows_((camera.height() + cell - 1) / cell) {}
+  std::size_t size() const { return static_cast<std::size_t>(columns_ * rows_); }
+  std::size_t of(const Eigen::Vector2d& pixel) const {
+    return static_cast<std::size_t>(static_cast<int>(pixel.y()) / cell_ * columns_ + static_cast<int>(pixel.x()) / cell_);
+  }
+
+ private:
+  int cell_, columns_, rows_;
+};
+
+/// What the camera at T_CW should see of the map.
+std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,
+                                 const VisionConfig& config);
+
+/// How the plane through p_W with normal n_W maps from the image at T_CW to that at T_RW, at the point: pixels by pixels. None where either
+/// does not see it.
+std::optional<Eigen::Matrix2d> affine_between(const Camera& camera, const SE3& T_CW, const SE3& T_RW, const Eigen::Vector3d& p_W,
+                                              const Eigen::Vector3d& n_W);
+
+}  // namespace kilvo
