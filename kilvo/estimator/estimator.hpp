@@ -69,7 +69,8 @@ class Estimator {
   // images.cpp
   const char* image_fault(const CameraImage& image);
   void process(const CameraImage& image);
-  void learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid, const DepthView& depth);
+  void learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid, const DepthView& depth,
+                  const Estimate& prior);
 
   Robot robot_;
   EstimatorConfig config_;

@@ -19,6 +19,13 @@ bool is_new_view(const Track& track) {
   return octaves > new_scale || track.view_angle > new_angle;
 }
 
+// What an image says of the pose goes into what it leaves behind only where the LiDAR is blind. Elsewhere its patches are kept where the LiDAR's
+// map has them: else two maps would come to be, each true to itself, whose rays and planes no longer meet where the surface is.
+SE3 as_the_map_has_it(const State& before, const State& after, const PoseCovariance& weak) {
+  const Eigen::Matrix<double, 6, 1> change = weak * boxminus(after, before).head<6>();
+  return {before.R * SO3::Exp(change.head<3>()), before.p + change.tail<3>()};
+}
+
 }  // namespace
 
 // What makes an image no use at all; nullptr: nothing.
@@ -57,22 +64,23 @@ void Estimator::process(const CameraImage& image) {
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::camera)].used;
   if (!keep_finite()) return;
   trajectory_.correct(image.t, estimate_->x.pose(), estimate_->x.v - prior.x.v);
-  learn_from(model, tracks, pyramid, depth);
+  learn_from(model, tracks, pyramid, depth, prior);
   settle(*estimate_);
   last_image_ = image.t;
 }
 
 void Estimator::learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,
-                           const DepthView& depth) {
-  const SE3 T_WI = estimate_->x.pose();
+                           const DepthView& depth, const Estimate& prior) {
+  const PoseCovariance known = PoseCovariance::Identity() - weak_;
+  const SE3 T_WI = as_the_map_has_it(prior.x, estimate_->x, weak_);
   const SE3 T_CW = T_CI_ * T_WI.inverse();
   VisualFrame frame;
   frame.T_CW = T_CW;
   frame.tau = estimate_->x.tau;
   frame.epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
   // Along what the LiDAR does not know, the error of this frame is that of the next ones: drift, which the epoch carries.
-  const PoseCovariance own = to_origin(T_WI) * (PoseCovariance::Identity() - weak_);
-  frame.noise.topLeftCorner<6, 6>() = own * estimate_->P.topLeftCorner<6, 6>() * own.transpose();
+  const PoseCovariance own = to_origin(T_WI) * known;
+  frame.noise.topLeftCorner<6, 6>() = own * prior.P.topLeftCorner<6, 6>() * own.transpose();
   frame.noise(6, 6) = estimate_->P(at::tau, at::tau);
   const std::uint32_t id = visual_map_.add_frame(frame);
   const auto view = [&](const Eigen::Vector2d& pixel) -> std::optional<Observation> {
