@@ -116,7 +116,9 @@ class Run {
   void keep(std::vector<Output> outputs) {
     for (Output& output : outputs) {
       files_.write(output);
-      if (options_.with_map && output.is_sweep) map_.add(std::move(output.points_W));
+      if (!options_.with_map) continue;
+      if (output.is_sweep) map_.add(std::move(output.points_W));
+      if (!output.coloured.empty()) map_.colour(std::move(output.coloured));
     }
   }
 
