@@ -13,6 +13,7 @@
 #include "kilvo/legs/contact_estimator.hpp"
 #include "kilvo/lidar/point_to_plane.hpp"
 #include "kilvo/sensors/measurement.hpp"
+#include "kilvo/vision/colours.hpp"
 
 namespace kilvo {
 
@@ -22,13 +23,6 @@ struct StageTimes {
   double map_us = 0;     // insertion
   double other_us = 0;   // the rest of the sweep
   double visual_us = 0;  // of an image
-};
-
-/// What an image says about the colour of a point of the map.
-struct ColouredPoint {
-  Eigen::Vector3f p_W;              // m
-  std::array<std::uint8_t, 3> rgb;  // as if exposed like the first image
-  float weight;                     // how well it was seen; only ratios matter
 };
 
 struct Output {

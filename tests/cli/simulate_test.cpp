@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "lab/mapping/ply.hpp"
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
@@ -97,6 +98,12 @@ TEST(Simulate, AllThatIsRecordedIsUsedAndItsTimeCounted) {
   for (const char* stage : {"lidar", "map", "other"}) EXPECT_EQ(stages.rows[stage], sweeps) << stage;
   EXPECT_EQ(stages.rows["visual"], summary["messages"]["camera"]["used"]);
   EXPECT_NEAR(summary["mean_ms_per_frame"], stages.total_ms / static_cast<double>(sweeps), 0.01);
+  const lab::Cloud cloud = lab::read_cloud(walk.folder / "all/map.ply");
+  ASSERT_EQ(cloud.rgb.size(), cloud.points_W.size());
+  const auto grey = std::ranges::count_if(cloud.rgb, [](const auto& rgb) { return rgb[0] == rgb[1] && rgb[1] == rgb[2]; });
+  EXPECT_LT(grey, 0.97 * static_cast<double>(cloud.rgb.size()));
+  ASSERT_EQ(kilvo({"run", walk.folder / "sim", "--out", walk.folder / "again", "--threads", "1"}).code, 0);
+  EXPECT_TRUE(read_text(walk.folder / "all/map.ply") == read_text(walk.folder / "again/map.ply"));
   const Finished info = kilvo({"info", walk.folder / "sim"});
   EXPECT_THAT(info.out, testing::Not(HasSubstr("not by this version")));
 }
