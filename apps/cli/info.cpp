@@ -17,7 +17,7 @@ struct InfoOptions {
 };
 
 std::string use_of(const lab::TopicDescription& topic) {
-  if (topic.used_for) return fmt::format("{}{}", name_of(*topic.used_for), is_supported(*topic.used_for) ? "" : " (not by this version)");
+  if (topic.used_for) return name_of(*topic.used_for);
   return topic.fits ? fmt::format("- (could be {})", name_of(*topic.fits)) : "-";
 }
 

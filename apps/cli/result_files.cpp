@@ -33,7 +33,7 @@ void ResultFiles::write(const Output& output) {
   const bool without_lidar = output.modality == Modality::ki || output.modality == Modality::coast;
   if (output.is_sweep || (without_lidar && (!last_state_ || output.t - *last_state_ >= state_period))) write_state(output);
   if (output.modality != last_modality_) write_modality(output);
-  if (output.is_sweep) write_stages(output);
+  if (output.is_sweep || output.is_image) write_stages(output);
   if (output.contacts) write_contacts(output);
   recap_.add(output);
 }
@@ -74,14 +74,18 @@ void ResultFiles::write_modality(const Output& output) {
 }
 
 void ResultFiles::write_stages(const Output& output) {
-  const std::pair<const char*, double> stages[] = {
-      {"lidar", output.stages.lidar_us}, {"map", output.stages.map_us}, {"other", output.stages.other_us}};
+  const StageTimes& stages = output.stages;
   std::string t;
   lab::append_seconds(t, output.t);
-  for (const auto& [stage, microseconds] : stages) {
+  const auto write = [&](const char* stage, double microseconds) {
     timing_.write(fmt::format("{},{},{:.1f}", t, stage, microseconds));
     recap_.stages.add(stage, microseconds);
-  }
+  };
+  if (output.is_image) write("visual", stages.visual_us);
+  if (!output.is_sweep) return;
+  write("lidar", stages.lidar_us);
+  write("map", stages.map_us);
+  write("other", stages.other_us);
 }
 
 void ResultFiles::close() {

@@ -53,7 +53,6 @@ void tell_start(const RunFacts& facts, const lab::RecordingSource& source, bool 
     if (sensor == Sensor::lidar) detail = no_deskew ? ", each cloud taken at its stamp" : ", point time: " + source.point_time().text();
     fmt::print(stderr, "kilvo: {} from {}{}\n", name_of(sensor), source.topic(sensor), detail);
   }
-  for (const std::string& text : facts.notes) fmt::print(stderr, "kilvo: {}\n", text);
 }
 
 Estimator make_estimator(const lab::Settings& settings, const std::vector<Sensor>& used) {
@@ -116,7 +115,9 @@ class Run {
   void keep(std::vector<Output> outputs) {
     for (Output& output : outputs) {
       files_.write(output);
-      if (options_.with_map && output.is_sweep) map_.add(std::move(output.points_W));
+      if (!options_.with_map) continue;
+      if (output.is_sweep) map_.add(std::move(output.points_W));
+      if (!output.coloured.empty()) map_.colour(std::move(output.coloured));
     }
   }
 
@@ -178,7 +179,6 @@ int run_recording(const RunOptions& options) {
   facts.input = options.input;
   facts.config_file = config.string();
   facts.sensors = choice.used;
-  facts.notes = choice.notes;
   facts.warnings = choice.warnings;
   InterruptWatch interrupt;  // before any thread, so that none of them takes the signal
   return Run(options, interrupt, std::move(settings), choice, std::move(facts)).all();

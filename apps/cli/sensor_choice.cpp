@@ -33,13 +33,10 @@ std::optional<double> take_seconds(std::string_view& text) {
   return value;
 }
 
-std::string unsupported(Sensor sensor) { return fmt::format("the sensor '{}' is not supported by this version", name_of(sensor)); }
-
 std::vector<Sensor> as_wanted(const std::vector<Sensor>& wanted, const lab::Settings& settings, const std::string& config) {
   if (std::ranges::find(wanted, Sensor::imu) == wanted.end())
     throw UsageError("--sensors: the imu is needed, nothing is estimated without it");
   for (const Sensor sensor : wanted) {
-    if (!is_supported(sensor)) throw UsageError(unsupported(sensor));
     if (!settings.has(sensor))
       throw UsageError(fmt::format("{}: {}.topic is missing: the sensor '{}' is not configured", config, name_of(sensor), name_of(sensor)));
   }
@@ -103,6 +100,8 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
   }
   const std::set<std::string> topics = topics_of(input);
   if (topics.empty()) throw lab::InputError(fmt::format("{}: holds no messages", input));
+  // Images alone measure no motion: without these the estimator coasts.
+  const auto measures_motion = [](Sensor sensor) { return sensor == Sensor::legs || sensor == Sensor::lidar; };
   bool any_present = false, more_configured = false;
   std::vector<std::string> missing;
   for (const Sensor sensor : every_sensor) {
@@ -110,11 +109,9 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
     const std::string& pattern = settings.topic(sensor);
     const bool present = std::ranges::any_of(topics, [&](const std::string& topic) { return lab::topic_matches(sensor, pattern, topic); });
     any_present = any_present || present;
-    more_configured = more_configured || sensor != Sensor::imu;
-    if (present && is_supported(sensor)) {
+    more_configured = more_configured || measures_motion(sensor);
+    if (present) {
       out.used.push_back(sensor);
-    } else if (present) {
-      out.notes.push_back(unsupported(sensor));
     } else {
       const std::vector<std::string> names(topics.begin(), topics.end());
       missing.push_back(fmt::format("no topic {} ({}), nearest is {}", pattern, name_of(sensor), lab::nearest(pattern, names)));
@@ -128,12 +125,11 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
   if (out.used.empty() || out.used.front() != Sensor::imu) {
     throw lab::InputError(fmt::format("{}: {}", input, missing.empty() ? "no IMU is configured" : missing.front()));
   }
-  if (out.used.size() == 1 && more_configured) {
+  if (more_configured && std::ranges::none_of(out.used, measures_motion)) {
     std::string why;
-    for (const auto& texts : {out.notes, out.warnings}) {
-      for (const std::string& text : texts) why += text + "; ";
-    }
-    throw lab::InputError(fmt::format("{}: nothing but the IMU could be used: {}say --sensors imu if that is what you want", input, why));
+    for (const std::string& text : out.warnings) why += text + "; ";
+    throw lab::InputError(
+        fmt::format("{}: neither legs nor LiDAR could be used: {}say --sensors imu if that is what you want", input, why));
   }
   return out;
 }

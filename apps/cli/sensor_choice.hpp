@@ -14,9 +14,6 @@ namespace kilvo::cli {
 
 inline constexpr std::array<Sensor, sensor_count> every_sensor{Sensor::imu, Sensor::legs, Sensor::lidar, Sensor::camera};
 
-/// What this version of the estimator can use: the one place that says so.
-constexpr bool is_supported(Sensor) { return true; }
-
 /// "imu,lidar" -> sensors. Throws UsageError, naming the nearest, for an unknown one.
 std::vector<Sensor> parse_sensors(const std::string& list);
 
@@ -25,12 +22,11 @@ lab::Failure parse_drop(const std::string& text);
 
 struct SensorChoice {
   std::vector<Sensor> used;
-  std::vector<std::string> notes;     // what is there and cannot be used yet
   std::vector<std::string> warnings;  // what is configured and not there
 };
 
-/// The sensors wanted; without a wish those that are configured, supported and in the input. Throws UsageError for a wish that cannot be
-/// fulfilled, InputError when the input has none of the topics configured, or nothing but the IMU where more is configured.
+/// The sensors wanted; without a wish those that are configured and in the input. Throws UsageError for a wish that cannot be fulfilled,
+/// InputError when the input has none of the topics configured, or neither legs nor LiDAR where any is configured.
 SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, const lab::Settings& settings, const std::string& config,
                             const std::string& input);
 

@@ -17,7 +17,7 @@ struct RunFacts {
   std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
   std::string input, config_file;
   std::vector<Sensor> sensors;
-  std::vector<std::string> notes, warnings;            // of the choice of sensors
+  std::vector<std::string> warnings;                   // of the choice of sensors
   std::string failure;                                 // why the run failed; empty when it did not
   std::array<std::uint64_t, sensor_count> withheld{};  // messages, by Sensor: what the user asked to drop
   double wall_seconds = 0;

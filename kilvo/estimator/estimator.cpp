@@ -87,7 +87,7 @@ std::vector<Output> Estimator::finish() {
     process_pending(held.t, out);
     if (!sweeps_.empty() && estimate_->t < held.t) replay_.advance(*estimate_, held.t, trajectory_);
   }
-  while (!sweeps_.empty()) {
+  while (!sweeps_.empty() || !images_.empty()) {
     // Each has a time of its own, after what has gone out already.
     if (last_output_) replay_.advance(*estimate_, std::max(estimate_->t, *last_output_ + Duration(1000)), trajectory_);
     emit(out);
@@ -211,6 +211,12 @@ Output Estimator::output_now() {
   if (!sweeps_.empty()) {
     o = std::move(sweeps_.front());
     sweeps_.pop_front();
+  }
+  if (!images_.empty()) {
+    o.is_image = true;
+    o.stages.visual_us = images_.front().stages.visual_us;
+    o.coloured = std::move(images_.front().coloured);
+    images_.pop_front();
   }
   o.t = estimate_->t;
   o.x = estimate_->x;

@@ -50,7 +50,7 @@ class Estimator {
   void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
   bool uses(Sensor s) const { return used_[static_cast<std::size_t>(s)]; }
   bool keep_finite();
-  Output output_now();  // with what a sweep left to go out
+  Output output_now();  // with what a sweep and an image left to go out
   void emit(std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0, double contact_us = 0);
 
   // asynchronous.cpp: IMU and legs
@@ -90,7 +90,8 @@ class Estimator {
     Time middle() const { return begin + (end - begin) / 2; }
   };
   std::deque<Pending> pending_;  // by end
-  std::deque<Output> sweeps_;  // results of sweeps, each to go out with one of the next leg samples
+  std::deque<Output> sweeps_;    // results of sweeps, each to go out with one of the next leg samples
+  std::deque<Output> images_;    // the same of images
   std::optional<Time> last_output_;
   Trajectory trajectory_;
   VoxelMap map_;
@@ -107,11 +108,11 @@ class Estimator {
   std::optional<LegKinematics> kinematics_;
   ContactEstimator contacts_;
   StanceTracker stances_;
-  std::optional<Time> last_legs_;  // while the legs are used
-  double leg_period_ = 0;          // between the last two leg samples, s
-  Time last_stance_{};             // when a foot was used last
-  Time last_sweep_{};              // end of the last sweep, or the start
-  Time last_middle_{};             // of the last sweep
+  std::optional<Time> last_legs_;   // while the legs are used
+  double leg_period_ = 0;           // between the last two leg samples, s
+  Time last_stance_{};              // when a foot was used last
+  Time last_sweep_{};               // end of the last sweep, or the start
+  Time last_middle_{};              // of the last sweep
   std::optional<Time> last_image_;  // that was used
   Modality modality_ = Modality::coast;
   const char* cause_ = "start";

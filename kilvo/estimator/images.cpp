@@ -5,6 +5,7 @@
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/estimator/stopwatch.hpp"
 #include "kilvo/filter/pose_error.hpp"
+#include "kilvo/vision/colours.hpp"
 #include "kilvo/vision/depth_view.hpp"
 #include "kilvo/vision/new_points.hpp"
 
@@ -67,6 +68,9 @@ void Estimator::process(const CameraImage& image) {
   learn_from(model, tracks, pyramid, depth, prior);
   settle(*estimate_);
   last_image_ = image.t;
+  Output& seen = images_.emplace_back();
+  seen.coloured = colours_of(image.image, estimate_->x.tau, *camera_, T_CI_ * estimate_->x.pose().inverse(), depth);
+  seen.stages.visual_us = watch.lap_us();
 }
 
 void Estimator::learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,

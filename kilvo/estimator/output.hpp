@@ -1,4 +1,4 @@
-// What the world gets: one for each leg sample while the legs are used, otherwise one for each IMU sample and each sweep.
+// What the world gets: one for each leg sample while the legs are used, otherwise one for each IMU sample, each sweep and each image.
 #pragma once
 
 #include <array>
@@ -13,14 +13,16 @@
 #include "kilvo/legs/contact_estimator.hpp"
 #include "kilvo/lidar/point_to_plane.hpp"
 #include "kilvo/sensors/measurement.hpp"
+#include "kilvo/vision/colours.hpp"
 
 namespace kilvo {
 
-/// Where the time of a sweep went. Measured, never decided upon.
+/// Where the time of a sweep, or of an image, went. Measured, never decided upon.
 struct StageTimes {
-  double lidar_us = 0;  // undistortion to the end of the update
-  double map_us = 0;    // insertion
-  double other_us = 0;  // the rest of the sweep
+  double lidar_us = 0;   // undistortion to the end of the update
+  double map_us = 0;     // insertion
+  double other_us = 0;   // the rest of the sweep
+  double visual_us = 0;  // of an image
 };
 
 struct Output {
@@ -30,13 +32,16 @@ struct Output {
   Modality modality = Modality::coast;
   const char* cause = "start";       // of the last change of modality
   bool is_sweep = false;             // state after the last update of a sweep
+  bool is_image = false;             // state after the update of an image
   std::optional<Contacts> contacts;  // of each leg sample
   double kinematic_us = 0;           // of a leg sample: kinematics, contacts, prediction and update
   double contact_us = 0;             // the contacts' part of it
+  StageTimes stages;                 // of a sweep, of an image
   // Only of sweeps:
   std::vector<PointXYZI> points_W;  // undistorted, in the world
   RegistrationReport registration;
-  StageTimes stages;
+  // Only of images:
+  std::vector<ColouredPoint> coloured;  // points of the map that it sees, exposure-corrected
 };
 
 /// What happened to the measurements of one sensor.

@@ -19,6 +19,8 @@ constexpr std::uint64_t axis_mask = (std::uint64_t{1} << axis_bits) - 1;
 constexpr double axis_offset = 1 << (axis_bits - 1);
 constexpr double fractions = 65536;
 constexpr std::uint16_t most_averaged = 32;
+constexpr float most_remembered = 64;  // as heavy as so many of the next colour; more would be lost in the rounding of the mean
+constexpr float least_weight = 1e-6F, most_weight = 1e6F;
 constexpr std::size_t block_size = 32;  // points on their way at a time, so that their cache misses overlap
 
 /// Spreads neighbouring voxels over all 64 bits (the finaliser of MurmurHash3).
@@ -36,6 +38,11 @@ std::uint16_t moved(std::uint16_t mean, std::uint16_t towards, float share) {
   const float from = mean;
   return static_cast<std::uint16_t>(std::lrint(from + share * (static_cast<float>(towards) - from)));
 }
+
+/// A positive float in 16 bits: its exponent and the first bits of its fraction, rounded.
+std::uint16_t upper_half(float x) { return static_cast<std::uint16_t>((std::bit_cast<std::uint32_t>(x) + 0x8000U) >> 16U); }
+
+float from_upper_half(std::uint16_t half) { return std::bit_cast<float>(static_cast<std::uint32_t>(half) << 16U); }
 
 }  // namespace
 
@@ -81,12 +88,18 @@ bool MapBuilder::locate(const Eigen::Vector4f& point_W, Voxel& sample) const {
   return true;
 }
 
+/// Where the table has the voxel of this key, or is empty when it has none.
+std::size_t MapBuilder::slot_of(const Table& table, std::uint64_t key, std::uint64_t hashed) const {
+  std::size_t place = hashed >> table.shift;
+  while (table.slots[place] != 0 && voxel(table.slots[place] - 1).key != key) place = (place + 1) & (table.slots.size() - 1);
+  return place;
+}
+
 void MapBuilder::merge(const Voxel& sample, std::uint64_t hashed) {
   Table& table = tables_[hashed % table_count];
-  std::size_t place = hashed >> table.shift;
-  for (; table.slots[place] != 0; place = (place + 1) & (table.slots.size() - 1)) {
+  const std::size_t place = slot_of(table, sample.key, hashed);
+  if (table.slots[place] != 0) {
     Voxel& known = voxel(table.slots[place] - 1);
-    if (known.key != sample.key) continue;
     if (known.count == most_averaged) return;
     ++known.count;
     const float share = 1.0F / static_cast<float>(known.count);
@@ -97,6 +110,23 @@ void MapBuilder::merge(const Voxel& sample, std::uint64_t hashed) {
   append(sample);
   table.slots[place] = static_cast<std::uint32_t>(size_);
   if (++table.used > table.limit) grow(table);
+}
+
+void MapBuilder::colour(std::span<const ColouredPoint> points) {
+  for (const ColouredPoint& point : points) {
+    Voxel sample;
+    if (!(point.weight > 0) || !locate(point.p_W.homogeneous(), sample)) continue;
+    const std::uint64_t hashed = hash(sample.key);
+    const Table& table = tables_[hashed % table_count];
+    const std::uint32_t number = table.slots[slot_of(table, sample.key, hashed)];
+    if (number == 0) continue;
+    Colour& known = colour_at(number - 1);
+    const float weight = std::clamp(point.weight, least_weight, most_weight), before = from_upper_half(known.weight);
+    if (known.weight == 0) ++coloured_;
+    const float share = weight / (before + weight);
+    for (std::size_t i = 0; i < 3; ++i) known.rgb[i] = moved(known.rgb[i], static_cast<std::uint16_t>(256 * point.rgb[i]), share);
+    known.weight = upper_half(std::max(before, std::min(before + weight, most_remembered * weight)));
+  }
 }
 
 void MapBuilder::append(const Voxel& sample) {
@@ -128,6 +158,24 @@ const MapBuilder::Voxel& MapBuilder::voxel(std::size_t i) const { return chunks_
 
 MapBuilder::Voxel& MapBuilder::voxel(std::size_t i) { return chunks_[i / chunk_size][i % chunk_size]; }
 
+MapBuilder::Colour& MapBuilder::colour_at(std::size_t i) {
+  const std::size_t chunk = i / chunk_size;
+  if (chunk >= colours_.size()) colours_.resize(chunk + 1);
+  if (!colours_[chunk]) colours_[chunk] = std::make_unique<Colour[]>(chunk_size);  // all zero: without colour
+  return colours_[chunk][i % chunk_size];
+}
+
+std::optional<std::array<std::uint8_t, 3>> MapBuilder::colour_of(std::size_t i) const {
+  assert(i < size_);
+  const std::size_t chunk = i / chunk_size;
+  if (chunk >= colours_.size() || !colours_[chunk]) return std::nullopt;
+  const Colour& known = colours_[chunk][i % chunk_size];
+  if (known.weight == 0) return std::nullopt;
+  std::array<std::uint8_t, 3> out{};
+  for (std::size_t k = 0; k < 3; ++k) out[k] = static_cast<std::uint8_t>((known.rgb[k] + 128) / 256);  // at most 255
+  return out;
+}
+
 Eigen::Vector4f MapBuilder::point(std::size_t i) const {
   assert(i < size_);
   const Voxel& v = voxel(i);
@@ -143,6 +191,7 @@ Eigen::Vector4f MapBuilder::point(std::size_t i) const {
 std::size_t MapBuilder::memory_bytes() const {
   std::size_t bytes = sizeof(*this) + chunks_.size() * chunk_size * sizeof(Voxel) + tables_.size() * sizeof(Table);
   for (const Table& table : tables_) bytes += table.slots.capacity() * sizeof(std::uint32_t);
+  for (const auto& chunk : colours_) bytes += sizeof(chunk) + (chunk ? chunk_size * sizeof(Colour) : 0);
   return bytes;
 }
 

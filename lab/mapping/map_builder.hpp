@@ -2,13 +2,16 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <vector>
 
+#include "kilvo/estimator/output.hpp"
 #include "kilvo/math/field.hpp"
 
 namespace kilvo::lab {
@@ -24,8 +27,8 @@ struct MappingConfig {
 
 /// One point per voxel: the mean of the first 32 that fell into it. A mean is smoother than the first point (walls get thinner than the
 /// LiDAR's noise), and because it is then left alone, a later pass that has drifted neither blurs nor moves what is there. The result
-/// depends on the points and their order only. Memory: 24 bytes per point kept and about 10 for finding it; it grows in small pieces, so
-/// that no call waits long for it and the old and the new never lie side by side.
+/// depends on the points and their order only. Memory: 24 bytes per point kept, about 10 for finding it and 8 for its colour where images
+/// have been; it grows in small pieces, so that no call waits long for it and the old and the new never lie side by side.
 class MapBuilder {
  public:
   /// Throws std::invalid_argument when the resolution is not a positive length.
@@ -35,10 +38,19 @@ class MapBuilder {
   /// more from the origin along an axis, are dropped and counted.
   void add(std::span<const Eigen::Vector4f> points_W);
 
+  /// Gives colour to the points whose voxels these fall into; where the map has no point there is nothing to colour. A point's colour is
+  /// the mean by weight of those given, until these weigh 64 times as much as the next one: from there on newer ones count no less.
+  /// Weights are taken between 1e-6 and 1e6; a point with a weight that is not positive is ignored.
+  void colour(std::span<const ColouredPoint> points);
+
   /// How many points the map has.
   std::size_t size() const { return size_; }
   /// Point i (x, y, z, intensity), in the order in which their voxels were first hit. i < size().
   Eigen::Vector4f point(std::size_t i) const;
+  /// The colour of point i; none when no image has seen it. i < size().
+  std::optional<std::array<std::uint8_t, 3>> colour_of(std::size_t i) const;
+  /// How many points have a colour.
+  std::size_t coloured() const { return coloured_; }
   /// How many of the points given to add() were not usable.
   std::uint64_t dropped() const { return dropped_; }
   /// What the map occupies.
@@ -52,6 +64,11 @@ class MapBuilder {
     float intensity;            // their mean
   };
 
+  struct Colour {
+    std::uint16_t rgb[3];  // in 1/256
+    std::uint16_t weight;  // of the mean: the upper half of a float; 0 without colour
+  };
+
   /// Open addressing: number of a voxel + 1, 0 where empty.
   struct Table {
     std::vector<std::uint32_t> slots;
@@ -61,18 +78,22 @@ class MapBuilder {
   };
 
   bool locate(const Eigen::Vector4f& point_W, Voxel& sample) const;
+  std::size_t slot_of(const Table& table, std::uint64_t key, std::uint64_t hashed) const;
   void merge(const Voxel& sample, std::uint64_t hashed);
   void append(const Voxel& sample);
   void grow(Table& table);
   const std::uint32_t& first_slot(std::uint64_t hashed) const;
   const Voxel& voxel(std::size_t i) const;
   Voxel& voxel(std::size_t i);
+  Colour& colour_at(std::size_t i);
 
   double resolution_;
   std::size_t size_ = 0;
+  std::size_t coloured_ = 0;
   std::uint64_t dropped_ = 0;
-  std::vector<std::unique_ptr<Voxel[]>> chunks_;  // never moved
-  std::vector<Table> tables_;                     // many small ones, grown one at a time
+  std::vector<std::unique_ptr<Voxel[]>> chunks_;    // never moved
+  std::vector<std::unique_ptr<Colour[]>> colours_;  // of the chunks; null, or missing, where nothing has a colour
+  std::vector<Table> tables_;                       // many small ones, grown one at a time
 };
 
 }  // namespace kilvo::lab

@@ -155,5 +155,123 @@ TEST(MapBuilder, RefusesAResolutionThatIsNoLength) {
   }
 }
 
+using Colours = std::vector<ColouredPoint>;
+using Rgb = std::array<std::uint8_t, 3>;
+
+MapBuilder one_point() {
+  MapBuilder map;
+  map.add(Points{{1.02F, 2.02F, 3.02F, 7}});
+  return map;
+}
+
+ColouredPoint there(Rgb rgb, float weight) { return {{1.04F, 2.01F, 3.03F}, rgb, weight}; }
+
+TEST(MapColours, GoToTheVoxelThatAPointFallsInto) {
+  MapBuilder map;
+  map.add(Points{{0.01F, 0.01F, 0.01F, 1}, {-0.01F, 0.01F, 0.01F, 2}, {0.06F, 0.01F, 0.01F, 3}});
+  const auto before = content(map);
+  EXPECT_EQ(map.coloured(), 0u);
+  map.colour(Colours{{{0.04F, 0.04F, 0.04F}, {10, 20, 30}, 1}, {{-0.04F, 0.04F, 0.04F}, {255, 0, 1}, 0.2F}});
+  EXPECT_EQ(map.colour_of(0), (Rgb{10, 20, 30}));
+  EXPECT_EQ(map.colour_of(1), (Rgb{255, 0, 1}));
+  EXPECT_EQ(map.colour_of(2), std::nullopt);
+  EXPECT_EQ(map.coloured(), 2u);
+  EXPECT_EQ(content(map), before);
+}
+
+TEST(MapColours, WhereTheMapHasNoPointThereIsNothingToColour) {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  MapBuilder map = one_point();
+  map.colour(Colours{
+      {{1.06F, 2.01F, 3.03F}, {1, 2, 3}, 1}, {{nan, 2, 3}, {1, 2, 3}, 1}, {{inf, 2, 3}, {1, 2, 3}, 1}, {{1e9F, 2, 3}, {1, 2, 3}, 1}});
+  for (const float weight : {0.0F, -1.0F, nan}) map.colour(Colours{there({1, 2, 3}, weight)});
+  EXPECT_EQ(map.coloured(), 0u);
+  EXPECT_EQ(map.size(), 1u);
+  EXPECT_EQ(map.dropped(), 0u);
+  MapBuilder empty;
+  empty.colour(Colours{there({1, 2, 3}, 1)});
+  EXPECT_EQ(empty.size(), 0u);
+}
+
+TEST(MapColours, AreTheMeanByWeight) {
+  for (const float scale : {1e-3F, 1.0F, 300.0F}) {  // only ratios matter
+    MapBuilder map = one_point();
+    map.colour(Colours{there({100, 0, 250}, scale)});
+    map.colour(Colours{there({200, 100, 50}, 3 * scale)});
+    EXPECT_EQ(map.colour_of(0), (Rgb{175, 75, 100}));
+    map.colour(Colours{there({0, 0, 0}, 0.04F * scale)});  // a poor image says little
+    EXPECT_EQ(map.colour_of(0), (Rgb{173, 74, 99}));
+    map.colour(Colours{there({40, 200, 10}, 400 * scale)});  // a much better one nearly all
+    EXPECT_EQ(map.colour_of(0), (Rgb{41, 199, 11}));
+    EXPECT_EQ(map.coloured(), 1u);
+  }
+}
+
+TEST(MapColours, AverageTheNoiseOfManyImagesAway) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(120, 20);
+  MapBuilder map = one_point();
+  for (int i = 0; i < 50; ++i) {
+    const auto value = static_cast<std::uint8_t>(noise(random));
+    map.colour(Colours{there({value, 7, 255}, 1)});
+  }
+  const Rgb mean = *map.colour_of(0);
+  EXPECT_NEAR(mean[0], 120, 3 * 20 / std::sqrt(50.0));
+  EXPECT_EQ(mean[1], 7);
+  EXPECT_EQ(mean[2], 255);
+}
+
+TEST(MapColours, ForgetAtLastWhatManyImagesSaid) {
+  MapBuilder map = one_point();
+  for (int i = 0; i < 5000; ++i) map.colour(Colours{there({200, 200, 0}, 1)});
+  map.colour(Colours{there({10, 10, 10}, 1)});
+  EXPECT_GE((*map.colour_of(0))[0], 196);
+  for (int i = 0; i < 64; ++i) map.colour(Colours{there({10, 10, 10}, 1)});
+  EXPECT_NEAR((*map.colour_of(0))[0], 10 + 190 / std::exp(1), 5);
+  for (int i = 0; i < 1000; ++i) map.colour(Colours{there({10, 10, 10}, 1)});
+  EXPECT_EQ(map.colour_of(0), (Rgb{10, 10, 10}));
+}
+
+TEST(MapColours, TakeWeightsOfAnySizeWithoutLosingThemselves) {
+  MapBuilder map = one_point();
+  map.colour(Colours{there({5, 6, 7}, std::numeric_limits<float>::denorm_min())});
+  EXPECT_EQ(map.colour_of(0), (Rgb{5, 6, 7}));
+  for (int i = 0; i < 200; ++i) map.colour(Colours{there({50, 60, 70}, std::numeric_limits<float>::infinity())});
+  EXPECT_EQ(map.colour_of(0), (Rgb{50, 60, 70}));
+}
+
+TEST(MapColours, DoNotDependOnHowTheyAreCutIntoCalls) {
+  const auto points = scattered(20000, 1, 6);
+  MapBuilder whole, pieces;
+  whole.add(points);
+  pieces.add(points);
+  std::mt19937 random(7);
+  Colours colours;
+  for (const auto& p : scattered(60000, 1, 8)) {
+    const auto byte = [&] { return static_cast<std::uint8_t>(random()); };
+    colours.push_back({p.head<3>(), {byte(), byte(), byte()}, std::abs(p[3])});
+  }
+  whole.colour(colours);
+  for (std::size_t begin = 0, step = 1; begin < colours.size(); begin += step, step = step * 7 % 1000 + 1)
+    pieces.colour(std::span(colours).subspan(begin, std::min(step, colours.size() - begin)));
+  EXPECT_GT(whole.coloured(), 8000u);
+  EXPECT_EQ(whole.coloured(), pieces.coloured());
+  for (std::size_t i = 0; i < whole.size(); ++i) ASSERT_EQ(whole.colour_of(i), pieces.colour_of(i));
+}
+
+TEST(MapColours, CostEightBytesPerPointAndNothingWithoutImages) {
+  MapBuilder map;
+  for (unsigned i = 0; i < 20; ++i) map.add(scattered(20000, 200, 30 + i));
+  const std::size_t plain = map.memory_bytes();
+  map.colour({});
+  EXPECT_EQ(map.memory_bytes(), plain);
+  Colours colours;
+  for (std::size_t i = 0; i < map.size(); ++i) colours.push_back({map.point(i).head<3>(), {1, 2, 3}, 1});
+  map.colour(colours);
+  EXPECT_GT(map.coloured(), map.size() - 20);  // rounding moves a point over the face of its voxel
+  EXPECT_LE(map.memory_bytes() - plain, 8 * (map.size() + 32768) + 4096);
+  EXPECT_LE(map.memory_bytes() / map.size(), 24u + 16u + 8u);
+}
+
 }  // namespace
 }  // namespace kilvo::lab

@@ -21,24 +21,76 @@ static_assert(std::endian::native == std::endian::little, "numbers are written a
 
 using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
-std::string header(std::size_t points) {
-  return "ply\nformat binary_little_endian 1.0\ncomment KILVO map: metres, world frame\nelement vertex " + std::to_string(points) +
-         "\nproperty float x\nproperty float y\nproperty float z\nproperty float intensity\nend_header\n";
+std::string header(const MapBuilder& map) {
+  std::string out = "ply\nformat binary_little_endian 1.0\ncomment KILVO map: metres, world frame\n";
+  if (map.coloured() > 0) out += "comment grey: not seen by the camera\n";
+  out +=
+      "element vertex " + std::to_string(map.size()) + "\nproperty float x\nproperty float y\nproperty float z\nproperty float intensity\n";
+  if (map.coloured() > 0) out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  return out + "end_header\n";
+}
+
+/// Greys for intensities, whatever their scale is: dark and light at the 1st and the 99th percentile of about 100 000 of the points.
+class Greys {
+ public:
+  explicit Greys(const MapBuilder& map) {
+    std::vector<float> some;
+    const std::size_t step = map.size() / 100000 + 1;
+    for (std::size_t i = 0; i < map.size(); i += step) some.push_back(map.point(i)[3]);
+    std::sort(some.begin(), some.end());
+    low_ = some[some.size() / 100];
+    span_ = some[some.size() - 1 - some.size() / 100] - low_;
+  }
+
+  std::uint8_t of(float intensity) const {
+    constexpr float dark = 50, light = 200;
+    if (!(span_ > 0)) return (dark + light) / 2;
+    return static_cast<std::uint8_t>(dark + (light - dark) * std::clamp((intensity - low_) / span_, 0.0F, 1.0F));
+  }
+
+ private:
+  float low_, span_;
+};
+
+using Vertex = std::array<char, sizeof(Eigen::Vector4f) + 3>;
+
+Vertex coloured_vertex(const MapBuilder& map, std::size_t i, const Greys& greys) {
+  const Eigen::Vector4f point = map.point(i);
+  auto rgb = map.colour_of(i);
+  if (!rgb) {
+    const std::uint8_t grey = greys.of(point[3]);
+    rgb = {grey, grey, grey};
+  }
+  Vertex out;
+  std::memcpy(out.data(), point.data(), sizeof(point));
+  std::memcpy(out.data() + sizeof(point), rgb->data(), rgb->size());
+  return out;
 }
 
 bool write_all(std::FILE* file, const void* data, std::size_t bytes) { return std::fwrite(data, 1, bytes, file) == bytes; }
 
+/// Vertices 0 to `size`, a few thousand at a time.
+template <class Make>
+bool write_vertices(std::FILE* file, std::size_t size, const Make& make) {
+  std::array<decltype(make(std::size_t{})), 4096> buffer;
+  for (std::size_t begin = 0; begin < size; begin += buffer.size()) {
+    const std::size_t count = std::min(buffer.size(), size - begin);
+    for (std::size_t i = 0; i < count; ++i) buffer[i] = make(begin + i);
+    if (!write_all(file, buffer.data(), count * sizeof(buffer[0]))) return false;
+  }
+  return true;
+}
+
+bool write_points(std::FILE* file, const MapBuilder& map) {
+  if (map.coloured() == 0) return write_vertices(file, map.size(), [&](std::size_t i) { return map.point(i); });
+  return write_vertices(file, map.size(), [&, greys = Greys(map)](std::size_t i) { return coloured_vertex(map, i, greys); });
+}
+
 bool write_map(const fs::path& path, const MapBuilder& map) {
   File file(std::fopen(path.c_str(), "wb"), std::fclose);
   if (!file) return false;
-  const std::string head = header(map.size());
-  if (!write_all(file.get(), head.data(), head.size())) return false;
-  std::array<Eigen::Vector4f, 4096> buffer;
-  for (std::size_t begin = 0; begin < map.size(); begin += buffer.size()) {
-    const std::size_t count = std::min(buffer.size(), map.size() - begin);
-    for (std::size_t i = 0; i < count; ++i) buffer[i] = map.point(begin + i);
-    if (!write_all(file.get(), buffer.data(), count * sizeof(buffer[0]))) return false;
-  }
+  const std::string head = header(map);
+  if (!write_all(file.get(), head.data(), head.size()) || !write_points(file.get(), map)) return false;
   return std::fclose(file.release()) == 0;
 }
 

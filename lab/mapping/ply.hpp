@@ -1,4 +1,4 @@
-// Point clouds as binary little-endian PLY: float x y z (m, world frame) and intensity.
+// Point clouds as binary little-endian PLY: float x y z (m, world frame) and intensity; where images gave colour, uchar red green blue.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,8 +13,9 @@
 
 namespace kilvo::lab {
 
-/// Writes the whole map, in its order: the same map gives the same bytes. A file that was there stays whole until the new one is complete
-/// (written beside it as PATH.partial, then renamed). Throws OutputError.
+/// Writes the whole map, in its order: the same map gives the same bytes. A map of which any point has a colour has red, green and blue;
+/// points that no image saw are then grey by their intensity, so that what one looks at is whole. A file that was there stays whole until
+/// the new one is complete (written beside it as PATH.partial, then renamed). Throws OutputError.
 void write_ply(const std::filesystem::path& path, const MapBuilder& map);
 
 /// A file that is not a PLY as written here; the message names the path.

@@ -80,6 +80,48 @@ TEST_F(Ply, TheSameInputGivesTheSameBytes) {
   EXPECT_NE(bytes("a.ply"), bytes("c.ply"));
 }
 
+TEST_F(Ply, HasColourOnlyWhereAnImageSawSomethingAndGreyElsewhere) {
+  MapBuilder map;
+  map.add(std::vector<Eigen::Vector4f>{{1, 2, 3, 0}, {5, 6, 7, 40}, {8, 9, 10, 80}});
+  map.colour(std::vector<ColouredPoint>{{{5, 6, 7}, {200, 100, 0}, 1}});
+  write_ply(folder / "map.ply", map);
+  const std::string header =
+      "ply\nformat binary_little_endian 1.0\ncomment KILVO map: metres, world frame\ncomment grey: not seen by the camera\n"
+      "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float intensity\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+  EXPECT_EQ(bytes("map.ply").substr(0, header.size()), header);
+  EXPECT_EQ(bytes("map.ply").size(), header.size() + 3 * 19);
+  const Cloud cloud = read_cloud(folder / "map.ply");
+  EXPECT_EQ(cloud.rgb, (std::vector<std::array<std::uint8_t, 3>>{{50, 50, 50}, {200, 100, 0}, {200, 200, 200}}));
+  EXPECT_EQ(cloud.intensity, (std::vector<float>{0, 40, 80}));
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(cloud.points_W[i], map.point(i).head<3>());
+}
+
+TEST_F(Ply, AColouredMapIsTheSameBytesWhereverItIsWritten) {
+  MapBuilder map = some_map();
+  std::vector<ColouredPoint> colours;
+  for (std::size_t i = 0; i < map.size(); i += 3) colours.push_back({map.point(i).head<3>(), {static_cast<std::uint8_t>(i), 1, 2}, 1});
+  map.colour(colours);
+  write_ply(folder / "a.ply", map);
+  write_ply(folder / "b.ply", map);
+  EXPECT_EQ(bytes("a.ply"), bytes("b.ply"));
+  const Cloud cloud = read_cloud(folder / "a.ply");
+  ASSERT_EQ(cloud.rgb.size(), map.size());
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const auto colour = map.colour_of(i);
+    const auto& rgb = cloud.rgb[i];
+    ASSERT_TRUE(colour ? rgb == *colour : rgb[0] == rgb[1] && rgb[1] == rgb[2]) << i;
+  }
+}
+
+TEST_F(Ply, IntensitiesThatAreAllTheSameAreAMiddleGrey) {
+  MapBuilder map;
+  map.add(std::vector<Eigen::Vector4f>{{1, 2, 3, 9}, {5, 6, 7, 9}});
+  map.colour(std::vector<ColouredPoint>{{{5, 6, 7}, {1, 2, 3}, 1}});
+  write_ply(folder / "map.ply", map);
+  EXPECT_EQ(read_cloud(folder / "map.ply").rgb.front(), (std::array<std::uint8_t, 3>{125, 125, 125}));
+}
+
 TEST_F(Ply, ReplacesAnOlderMapAndLeavesNothingBeside) {
   std::ofstream(folder / "map.ply") << "old";
   write_ply(folder / "map.ply", some_map());

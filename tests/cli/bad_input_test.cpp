@@ -55,7 +55,7 @@ TEST_F(BadInput, AWrongTopicNamesTheNearest) {
   expect_refused(run({"--sensors", "imu,lidar", "--set", "lidar.topic=/point"}), 3, "/points");
   expect_refused(run({"--sensors", "imu,lidar", "--set", "imu.topic=/imv"}), 3, "/imu");
   expect_refused(run({"--set", "imu.topic=/imv"}), 3, "nearest is /imu");
-  expect_refused(run({"--set", "lidar.topic=/point"}), 3, "nearest is /points");  // nothing but the IMU is left
+  expect_refused(run({"--set", "lidar.topic=/point"}), 3, "nearest is /points");  // no LiDAR, no legs
   expect_refused(run({"--set", "lidar.topic=/point", "--set", "imu.topic=/imv"}), 3, "none of the topics");
 }
 

@@ -1,7 +1,10 @@
 // kilvo simulate: the files it writes, what others read in them, and KILVO on them.
 #include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "lab/mapping/ply.hpp"
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
@@ -63,6 +66,47 @@ struct Simulated {
     EXPECT_GT(errors.path_length_m, 0.3);
   }
 };
+
+/// Of timing.csv: how many rows each stage has, and how long they took altogether, ms.
+struct StageSums {
+  std::map<std::string, std::size_t> rows;
+  double total_ms = 0;
+};
+StageSums stage_sums(const std::string& path) {
+  std::istringstream in(read_text(path));
+  std::string t, stage, microseconds;
+  std::getline(in, t);
+  StageSums out;
+  while (std::getline(in, t, ',') && std::getline(in, stage, ',') && std::getline(in, microseconds)) {
+    ++out.rows[stage];
+    if (stage != "contact") out.total_ms += 1e-3 * std::stod(microseconds);  // it is a part of `kinematic`
+  }
+  return out;
+}
+
+TEST(Simulate, AllThatIsRecordedIsUsedAndItsTimeCounted) {
+  const Simulated walk;
+  ASSERT_EQ(kilvo({"simulate", "room", "--out", walk.folder / "sim", "--seed", "4", "--duration", "3"}).code, 0);
+  const Finished f = kilvo({"run", walk.folder / "sim", "--out", walk.folder / "all"});
+  ASSERT_EQ(f.code, 0) << f.err;
+  EXPECT_THAT(f.err, HasSubstr("camera from /camera/image_raw"));
+  EXPECT_THAT(f.err, testing::Not(HasSubstr("not supported")));
+  const auto summary = nlohmann::json::parse(read_text(walk.folder / "all/summary.json"));
+  const std::size_t sweeps = summary["sweeps"];
+  StageSums stages = stage_sums(walk.folder / "all/timing.csv");
+  EXPECT_EQ(lines_in(walk.folder / "all/sweeps.tum"), sweeps);  // none for an image
+  for (const char* stage : {"lidar", "map", "other"}) EXPECT_EQ(stages.rows[stage], sweeps) << stage;
+  EXPECT_EQ(stages.rows["visual"], summary["messages"]["camera"]["used"]);
+  EXPECT_NEAR(summary["mean_ms_per_frame"], stages.total_ms / static_cast<double>(sweeps), 0.01);
+  const lab::Cloud cloud = lab::read_cloud(walk.folder / "all/map.ply");
+  ASSERT_EQ(cloud.rgb.size(), cloud.points_W.size());
+  const auto grey = std::ranges::count_if(cloud.rgb, [](const auto& rgb) { return rgb[0] == rgb[1] && rgb[1] == rgb[2]; });
+  EXPECT_LT(grey, 0.97 * static_cast<double>(cloud.rgb.size()));
+  ASSERT_EQ(kilvo({"run", walk.folder / "sim", "--out", walk.folder / "again", "--threads", "1"}).code, 0);
+  EXPECT_TRUE(read_text(walk.folder / "all/map.ply") == read_text(walk.folder / "again/map.ply"));
+  const Finished info = kilvo({"info", walk.folder / "sim"});
+  EXPECT_THAT(info.out, testing::Not(HasSubstr("not by this version")));
+}
 
 TEST(Simulate, AWalkIsWrittenReadByOthersAndRunOn) {
   const Simulated walk;

@@ -47,10 +47,11 @@ TEST(Usage, MissingOrImpossibleWordsAreSaid) {
 TEST(Usage, SensorsThatCannotBeUsedAreRefused) {
   const TemporaryFolder folder;
   expect_error({"run", "x.bag", "--out", folder / "out", "--sensors", "lidar"}, 2, "the imu is needed");
-  expect_error({"run", "x.bag", "--out", folder / "out", "--sensors", "camera,imu,lidar"}, 2, "the sensor 'camera' is not supported");
   write_text(folder / "robot.yaml", "imu: {topic: /imu}");
   expect_error({"run", "x.bag", "--out", folder / "out", "--config", folder / "robot.yaml", "--sensors", "imu,lidar"}, 2,
                "lidar.topic is missing");
+  expect_error({"run", "x.bag", "--out", folder / "out", "--config", folder / "robot.yaml", "--sensors", "camera,imu"}, 2,
+               "camera.topic is missing");
 }
 
 TEST(Usage, HelpAndVersionGoToStdout) {

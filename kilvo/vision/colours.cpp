@@ -1,0 +1,37 @@
+#include "kilvo/vision/colours.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kilvo {
+namespace {
+
+constexpr double nearest = 0.5;   // m; closer is no better
+constexpr int overexposed = 250;  // of a channel: how bright it really was, nobody knows
+constexpr float of_overexposed = 0.02F;
+
+std::uint8_t exposed(int value, double tau) { return static_cast<std::uint8_t>(std::lround(std::clamp(value * tau, 0.0, 255.0))); }
+
+}  // namespace
+
+std::vector<ColouredPoint> colours_of(const Image& image, double tau, const Camera& camera, const SE3& T_CW, const DepthView& view) {
+  std::vector<ColouredPoint> out;
+  const auto channels = static_cast<std::size_t>(image.channels), width = static_cast<std::size_t>(image.width);
+  for (const DepthView::Seen& seen : view.seen()) {
+    if (!view.shows(seen)) continue;
+    const Eigen::Vector3d p_W = view.point(seen), p_C = T_CW * p_W;
+    const auto pixel = camera.project(p_C);
+    if (!pixel || !camera.sees(*pixel, 0)) continue;
+    const auto u = static_cast<std::size_t>(std::lround(pixel->x())), v = static_cast<std::size_t>(std::lround(pixel->y()));
+    const std::uint8_t* value = image.pixels.data() + channels * (v * width + u);
+    ColouredPoint& point = out.emplace_back();
+    point.p_W = p_W.cast<float>();
+    for (std::size_t i = 0; i < 3; ++i) point.rgb[i] = exposed(value[channels == 3 ? i : 0], tau);
+    const double depth = std::max(p_C.z(), nearest);
+    point.weight = static_cast<float>(1 / (depth * depth));  // as the share of the image that it takes
+    if (*std::max_element(value, value + channels) >= overexposed) point.weight *= of_overexposed;
+  }
+  return out;
+}
+
+}  // namespace kilvo
