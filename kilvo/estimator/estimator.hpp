@@ -103,7 +103,8 @@ class Estimator {
   SE3 T_CI_;
   VisualMap visual_map_;
   std::vector<PointXYZI> seen_W_;      // points of the last sweep
-  std::vector<std::uint8_t> picture_;  // of the last image
+  std::vector<std::uint8_t> picture_;             // of the last image
+  std::optional<Eigen::Vector3d> last_seen_from_;  // where the last image was taken, m
 
   std::optional<LegKinematics> kinematics_;
   ContactEstimator contacts_;

@@ -65,6 +65,9 @@ void Estimator::process(const CameraImage& image) {
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::camera)].used;
   if (!keep_finite()) return;
   trajectory_.correct(image.t, estimate_->x.pose(), estimate_->x.v - prior.x.v);
+  const SE3 T_WI = estimate_->x.pose();
+  if (!weak_.isZero(0)) map_error_.seen(T_WI, model.by_frame(), weak_, last_seen_from_ ? (T_WI.p - *last_seen_from_).norm() : 0);
+  last_seen_from_ = T_WI.p;
   learn_from(model, tracks, pyramid, depth, prior);
   settle(*estimate_);
   last_image_ = image.t;

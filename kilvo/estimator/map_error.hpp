@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,7 +27,13 @@ class MapError {
   /// to its part along them) D stays what it was.
   void registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak);
 
+  /// An image was held against views of these epochs, `travelled` metres after the last one. Along `weak`, which no sweep knows, D becomes
+  /// what the views are wrong by.
+  void seen(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak, double travelled);
+
  private:
+  std::optional<PoseCovariance> error_behind(const SE3& T_WI, std::span<const EpochInformation> epochs) const;
+
   std::vector<PoseCovariance> epochs_;           // as twists at the world's origin
   PoseCovariance now_ = PoseCovariance::Zero();  // likewise
 };

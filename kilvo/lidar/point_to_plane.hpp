@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "kilvo/filter/epoch_information.hpp"
 #include "kilvo/filter/measurement_rows.hpp"
 #include "kilvo/lidar/degeneracy.hpp"
 #include "kilvo/lidar/downsample.hpp"
@@ -27,12 +28,6 @@ struct RegistrationReport {
   int rejected = 0;  // had a plane but failed the gate
   double chi2_per_row = 0;
   Degeneracy degeneracy;
-};
-
-/// What the rows on planes of one epoch of the map (VoxelMap::insert) know about the pose.
-struct EpochInformation {
-  std::uint32_t epoch = 0;
-  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
 /// The model that `update` calls: at each iterate it looks the planes up anew, gates, and sums the rows.

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "kilvo/filter/epoch_information.hpp"
 #include "kilvo/filter/measurement_rows.hpp"
 #include "kilvo/map/visual_map.hpp"
 #include "kilvo/vision/camera.hpp"
@@ -47,11 +48,6 @@ class PhotometricModel {
     int tracks = 0, used = 0, moved = 0, unlike = 0;
     double noise = 1;  // of the pixels, times what was expected (standard deviation)
   };
-  struct FrameInformation {
-    std::uint32_t epoch = 0;
-    Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
-  };
-
   /// Keeps references: the map, the camera, the pyramid and the tracks must outlive it. `prior`: of the pose before the image; it says how
   /// coarsely to begin.
   PhotometricModel(const VisualMap& map, const Camera& camera, const SE3& T_CI, std::span<const GreyImage> pyramid,
@@ -68,7 +64,7 @@ class PhotometricModel {
   // Of the last evaluation:
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
   const Report& report() const { return report_; }
-  const std::vector<FrameInformation>& by_frame() const { return by_frame_; }
+  const std::vector<EpochInformation>& by_frame() const { return by_frame_; }
 
  private:
   struct Prepared {
@@ -107,7 +103,7 @@ class PhotometricModel {
     Information<7> info;
   };
   std::vector<Group> groups_;
-  std::vector<FrameInformation> by_frame_;
+  std::vector<EpochInformation> by_frame_;
 };
 
 }  // namespace kilvo
