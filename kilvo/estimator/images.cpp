@@ -15,6 +15,9 @@ namespace {
 // A view that differs so much from those that a point has is kept as well: octaves of scale, rad.
 constexpr double new_scale = 0.4, new_angle = 0.25;
 
+// So many patches hold a pose by themselves.
+constexpr int enough = 20;
+
 bool is_new_view(const Track& track) {
   const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(track.A.determinant()))));
   return octaves > new_scale || track.view_angle > new_angle;
@@ -66,7 +69,7 @@ void Estimator::process(const CameraImage& image) {
   if (!keep_finite()) return;
   trajectory_.correct(image.t, estimate_->x.pose(), estimate_->x.v - prior.x.v);
   const SE3 T_WI = estimate_->x.pose();
-  if (!weak_.isZero(0)) map_error_.seen(T_WI, model.by_frame(), weak_, last_seen_from_ ? (T_WI.p - *last_seen_from_).norm() : 0);
+  if (!weak_.isZero(0) && model.report().used >= enough) map_error_.seen(T_WI, model.by_frame(), weak_, last_seen_from_ ? (T_WI.p - *last_seen_from_).norm() : 0);
   last_seen_from_ = T_WI.p;
   learn_from(model, tracks, pyramid, depth, prior);
   settle(*estimate_);

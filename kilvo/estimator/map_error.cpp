@@ -55,10 +55,10 @@ std::uint32_t MapError::epoch_now(const SE3& T_WI, const PoseCovariance& P) {
   return static_cast<std::uint32_t>(epochs_.size() - 1);
 }
 
-std::optional<PoseCovariance> MapError::error_behind(const SE3& T_WI, std::span<const EpochInformation> epochs) const {
+void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak) {
   PoseCovariance A = PoseCovariance::Zero();
   for (const EpochInformation& e : epochs) A += e.A;
-  if (!(A.topLeftCorner<3, 3>().trace() > 0) || !(A.bottomRightCorner<3, 3>().trace() > 0)) return std::nullopt;
+  if (!(A.topLeftCorner<3, 3>().trace() > 0) || !(A.bottomRightCorner<3, 3>().trace() > 0)) return;
   const PoseCovariance inverse = inverse_of_known(A);
   const PoseCovariance G = from_origin(T_WI);
   PoseCovariance root = PoseCovariance::Zero();
@@ -68,27 +68,24 @@ std::optional<PoseCovariance> MapError::error_behind(const SE3& T_WI, std::span<
       (A.bottomRightCorner<3, 3>().trace() / 3.0) * inverse.bottomRightCorner<3, 3>();  // 1 where all are held equally
   PoseCovariance systematic = PoseCovariance::Zero();
   systematic.bottomRightCorner<3, 3>() = plane_error * plane_error * looseness * looseness;
-  return root * root.transpose() + systematic;
-}
-
-void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak) {
-  const auto error = error_behind(T_WI, epochs);
-  if (!error) return;
   const PoseCovariance H = to_origin(T_WI);
-  now_ = H * (*error + weak * at(T_WI) * weak.transpose()) * H.transpose();
+  now_ = H * (root * root.transpose() + systematic + weak * at(T_WI) * weak.transpose()) * H.transpose();
 }
 
 void MapError::seen(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak, double travelled) {
-  const auto error = error_behind(T_WI, epochs);
-  if (!error) return;
+  double all = 0;
+  for (const EpochInformation& e : epochs) all += e.A.bottomRightCorner<3, 3>().trace();
+  if (!(all > 0)) return;
+  const PoseCovariance G = from_origin(T_WI);
+  PoseCovariance views = PoseCovariance::Zero();
+  for (const EpochInformation& e : epochs) views += (e.A.bottomRightCorner<3, 3>().trace() / all) * G * epochs_[e.epoch] * G.transpose();
   // Each metre is wrong by the same share, so that standard deviations add.
   const PoseCovariance before = at(T_WI);
   const double sigma = std::sqrt((weak * before * weak.transpose()).bottomRightCorner<3, 3>().trace()), more = scale_error * travelled;
-  PoseCovariance drift = *error;
-  drift.bottomRightCorner<3, 3>().diagonal().array() += (2 * sigma + more) * more;
+  views.bottomRightCorner<3, 3>().diagonal().array() += (2 * sigma + more) * more;
   const PoseCovariance known = PoseCovariance::Identity() - weak;
   const PoseCovariance H = to_origin(T_WI);
-  now_ = H * (known * before * known.transpose() + weak * drift * weak.transpose()) * H.transpose();
+  now_ = H * (known * before * known.transpose() + weak * views * weak.transpose()) * H.transpose();
 }
 
 }  // namespace kilvo

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -32,8 +31,6 @@ class MapError {
   void seen(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak, double travelled);
 
  private:
-  std::optional<PoseCovariance> error_behind(const SE3& T_WI, std::span<const EpochInformation> epochs) const;
-
   std::vector<PoseCovariance> epochs_;           // as twists at the world's origin
   PoseCovariance now_ = PoseCovariance::Zero();  // likewise
 };

@@ -23,35 +23,32 @@ using Values = std::array<float, Template::count>;
 
 PatchSums sums_of(const Template& patch, const Values& image, double tau, double tau_patch, double bias_variance, double variance) {
   const auto t = static_cast<float>(tau), tp = static_cast<float>(tau_patch);
-  // Of the image: gradient and value come from the patch, so that they stay the same from iterate to iterate.
-  float xx = 0, xy = 0, yy = 0, xi = 0, yi = 0, ii = 0, sx = 0, sy = 0, si = 0, xr = 0, yr = 0, ir = 0, sr = 0, rr = 0, top = 0;
-  const float per_tau = tp / t;
+  // The gradient is the patch's, so that it stays the same from iterate to iterate. The exposure is known by the patch's mean alone: by its
+  // contrast, noise that is in the patch and in r would make each generation of patches look a little darker than the last.
+  float xx = 0, xy = 0, yy = 0, sx = 0, sy = 0, xr = 0, yr = 0, sr = 0, rr = 0, sum = 0, top = 0;
   for (std::size_t k = 0; k < Template::count; ++k) {
-    const float x = tp * patch.dx[k], y = tp * patch.dy[k], i = per_tau * patch.value[k];
+    const float x = tp * patch.dx[k], y = tp * patch.dy[k];
     const float r = t * image[k] - tp * patch.value[k];
     xx += x * x;
     xy += x * y;
     yy += y * y;
-    xi += x * i;
-    yi += y * i;
-    ii += i * i;
     sx += x;
     sy += y;
-    si += i;
     xr += x * r;
     yr += y * r;
-    ir += i * r;
     sr += r;
     rr += r * r;
+    sum += patch.value[k];
     top = std::max(top, std::max(image[k], patch.value[k]));
   }
   constexpr double n = Template::count;
   PatchSums out;
   out.saturated = top > bright;
-  const Eigen::Vector3d s(static_cast<double>(sx), static_cast<double>(sy), static_cast<double>(si));
-  out.A << static_cast<double>(xx), static_cast<double>(xy), static_cast<double>(xi), static_cast<double>(xy), static_cast<double>(yy),
-      static_cast<double>(yi), static_cast<double>(xi), static_cast<double>(yi), static_cast<double>(ii);
-  out.b << static_cast<double>(xr), static_cast<double>(yr), static_cast<double>(ir);
+  const double i = static_cast<double>(tp / t * sum) / n;
+  const Eigen::Vector3d s(static_cast<double>(sx), static_cast<double>(sy), n * i);
+  out.A << static_cast<double>(xx), static_cast<double>(xy), i * s[0], static_cast<double>(xy), static_cast<double>(yy), i * s[1], i * s[0],
+      i * s[1], n * i * i;
+  out.b << static_cast<double>(xr), static_cast<double>(yr), i * static_cast<double>(sr);
   const double pixels = n + variance / bias_variance;
   out.A -= s * s.transpose() / pixels;
   out.b -= s * static_cast<double>(sr) / pixels;

@@ -12,7 +12,7 @@ struct VisionConfig {
   double read_noise = 1.5;      // grey
   double shot_noise = 0.015;    // grey
   double pixel_error = 0.05;    // px
-  double bias_share = 0.02;
+  double bias_share = 0.01;
   double min_corner = 4.0;      // grey^2/px^2
   double min_correlation = 0.8;
   double gate = 4.0;            // sigma
