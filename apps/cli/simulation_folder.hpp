@@ -12,6 +12,7 @@ struct SimulationOptions {
   std::string scenario;            // by name; `kilvo simulate --help` lists them
   std::int64_t seed = 1;           // of furniture, textures and noise
   std::optional<double> duration;  // s; until the walk ends by default
+  double stride = 1;               // every step so many times as long as in the scenario
   bool quiet = false;              // no progress
 };
 
