@@ -12,8 +12,8 @@ struct SimulationOptions {
   std::string scenario;            // by name; `kilvo simulate --help` lists them
   std::int64_t seed = 1;           // of furniture, textures and noise
   std::optional<double> duration;  // s; until the walk ends by default
-  double stride = 1;               // every step so many times as long as in the scenario
   bool quiet = false;              // no progress
+  double stride = 1;               // every step so many times as long as in the scenario
 };
 
 /// Writes recording.bag, gt.tum, contacts.gt.csv, imu_truth.csv, exposure.csv, robot.urdf and config.yaml into `folder`. Returns the
