@@ -1,7 +1,7 @@
 #include "lab/simulation/texture.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "lab/simulation/random.hpp"
@@ -91,13 +91,11 @@ Grid paint(Pattern pattern, std::uint64_t seed) {
 }
 
 // The columns before the first and after the last are there twice, so that a spline finds its four in a row.
-std::vector<std::uint8_t> rounded(const Grid& grid, std::size_t n) {
-  std::vector<std::uint8_t> out;
+Grid with_wrapped_columns(const Grid& grid, std::size_t n) {
+  Grid out;
   out.reserve(n * (n + 3));
   for (std::size_t y = 0; y < n; ++y) {
-    for (std::size_t x = 0; x < n + 3; ++x) {
-      out.push_back(static_cast<std::uint8_t>(std::lround(255 * std::clamp(grid[y * n + (x + n - 1) % n], 0.0F, 1.0F))));
-    }
+    for (std::size_t x = 0; x < n + 3; ++x) out.push_back(grid[y * n + (x + n - 1) % n]);
   }
   return out;
 }
@@ -136,7 +134,7 @@ Grid softened(const Grid& grid, std::size_t n, double variance) {
 }
 
 // Of the four values around a place, `f` beyond the second of them: a cubic B-spline.
-std::array<float, 4> spline_weights(float f) {
+Eigen::Array4f spline_weights(float f) {
   const float g = 1 - f, f2 = f * f, g2 = g * g;
   return {g2 * g / 6, (4 - 3 * f2 * (2 - f)) / 6, (4 - 3 * g2 * (2 - g)) / 6, f2 * f / 6};
 }
@@ -148,8 +146,8 @@ Texture::Texture(Pattern pattern, std::uint64_t seed) {
   for (float& value : grid) value = std::clamp(value, 0.0F, 1.0F);
   grid = softened(grid, size, of_copy - 1.0 / 12);  // a painted texel is a box
   for (std::size_t n = size;; n /= 2) {
-    levels_.push_back(rounded(grid, n));
-    levels_.push_back(rounded(softened(grid, n, of_copy + of_spline), n));
+    levels_.push_back(with_wrapped_columns(grid, n));
+    levels_.push_back(with_wrapped_columns(softened(grid, n, of_copy + of_spline), n));
     if (n == 1) break;
     grid = halved(grid, n);
   }
@@ -160,14 +158,13 @@ float Texture::spline(std::size_t level, double x, double y) const {
   const double px = x * static_cast<double>(n) - 0.5, py = y * static_cast<double>(n) - 0.5, fx = whole(px), fy = whole(py);
   const auto i = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(fx)) & mask;
   const auto j = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(fy)) + mask;  // the row before, and never below zero
-  const auto wx = spline_weights(static_cast<float>(px - fx)), wy = spline_weights(static_cast<float>(py - fy));
-  float sum = 0;
+  const Eigen::Array4f across = spline_weights(static_cast<float>(px - fx)), down = spline_weights(static_cast<float>(py - fy));
+  const float* texels = levels_[level].data() + i;
+  Eigen::Array4f sum = Eigen::Array4f::Zero();
   for (std::size_t r = 0; r < 4; ++r) {
-    const std::uint8_t* p = &levels_[level][((j + r) & mask) * stride + i];
-    sum += wy[r] * (wx[0] * static_cast<float>(p[0]) + wx[1] * static_cast<float>(p[1]) + wx[2] * static_cast<float>(p[2]) +
-                    wx[3] * static_cast<float>(p[3]));
+    sum += down[static_cast<Eigen::Index>(r)] * Eigen::Map<const Eigen::Array4f>(texels + ((j + r) & mask) * stride);
   }
-  return sum / 255;
+  return (across * sum).sum();
 }
 
 // From copy to copy the variance doubles. Between two of them, shares of both have the variance that is wanted.

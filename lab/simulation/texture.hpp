@@ -28,7 +28,7 @@ class Texture {
   float spline(std::size_t level, double x, double y) const;
 
   // Each with twice the blur's variance of the one before, every second half as wide; three columns come again at the end of each row.
-  std::vector<std::vector<std::uint8_t>> levels_;
+  std::vector<std::vector<float>> levels_;
 };
 
 }  // namespace kilvo::lab

@@ -50,9 +50,9 @@ struct Looks {
 
 // `right`, `down`: what a pixel is on the surface; `blur`: of the Gaussian, in pixels.
 Looks looks_through(const Eigen::Vector2d& right, const Eigen::Vector2d& down, double blur) {
-  constexpr double per_sigma = 2.2, round = 1.15, longest = most_looks / per_sigma;
+  constexpr double per_sigma = 1.8, round = 1.15, longest = most_looks / per_sigma;
   const double a = right.x() * right.x() + down.x() * down.x(), c = right.y() * right.y() + down.y() * down.y();
-  const double b = right.x() * right.y() + down.x() * down.y(), middle = (a + c) / 2, spread = std::hypot((a - c) / 2, b);
+  const double b = right.x() * right.y() + down.x() * down.y(), middle = (a + c) / 2, spread = std::sqrt((a - c) * (a - c) / 4 + b * b);
   const double large = blur * blur * (middle + spread), small = std::max(blur * blur * (middle - spread), large / (longest * longest));
   if (large < round * round * small) return {1, std::sqrt((large + small) / 2), Eigen::Vector2d::Zero()};
   // The row's variance makes up for what the circles lack.
