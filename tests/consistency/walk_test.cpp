@@ -206,9 +206,16 @@ TEST_F(Consistency, InAKnownWorldTheErrorOfKilIsWhatTheCovarianceSays) {
   expect_strict("position", known_.at(kil), &Sample::position, 3);
 }
 
-TEST_F(Consistency, OnTheLegsAloneTheErrorOfVelocityAndTiltIsWhatTheCovarianceSays) {
-  expect_strict("velocity", runs_.at(ki), &Sample::velocity, 3);
-  expect_strict("tilt", runs_.at(ki), &Sample::tilt, 2);
+// On the legs alone only from above: what a standing foot of a real robot does, bend and roll, is in the filter's noise, and a simulated
+// sole does none of it.
+TEST_F(Consistency, OnTheLegsAloneVelocityAndTiltAreNotBelievedMoreThanTheyAreKnown) {
+  const std::vector<Samples>& runs = runs_.at(ki);
+  const Share velocity = share(runs, &Sample::velocity, 0, limits(3, runs.size()).high);
+  const Share tilt = share(runs, &Sample::tilt, 0, limits(2, runs.size()).high);
+  testing::Test::RecordProperty("velocity", std::to_string(velocity.mean));
+  testing::Test::RecordProperty("tilt", std::to_string(tilt.mean));
+  EXPECT_GE(velocity.inside, 0.9) << "mean NEES of velocity " << velocity.mean;
+  EXPECT_GE(tilt.inside, 0.9) << "mean NEES of tilt " << tilt.mean;
 }
 
 }  // namespace
