@@ -68,7 +68,8 @@ CameraSensor::CameraSensor(const SimulatorConfig& config, const World& world) : 
 
 PixelRay CameraSensor::ray_of(int u, int v, const SO3& R_WC) const {
   const auto at = [&](int x, int y) {
-    return directions_[static_cast<std::size_t>(y + 1) * static_cast<std::size_t>(config_.camera.width + 2) + static_cast<std::size_t>(x + 1)]
+    return directions_[static_cast<std::size_t>(y + 1) * static_cast<std::size_t>(config_.camera.width + 2) +
+                       static_cast<std::size_t>(x + 1)]
         .cast<double>();
   };
   return {(R_WC * Eigen::Vector3d(at(u, v))).normalized(), R_WC * Eigen::Vector3d((at(u + 1, v) - at(u - 1, v)) / 2),
@@ -100,7 +101,8 @@ void CameraSensor::add_light(const SE3& T_WC, int first_row, int last_row, std::
   std::vector<std::optional<Hit>> hits;
   for (int v = first_row - 1; v <= last_row; ++v) {
     for (int u = -1; u <= width; ++u) {
-      const auto& direction = directions_[static_cast<std::size_t>(v + 1) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(u + 1)];
+      const auto& direction =
+          directions_[static_cast<std::size_t>(v + 1) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(u + 1)];
       hits.push_back(world_.cast(T_WC.p, (T_WC.R * direction.cast<double>()).normalized()));
       seen.push_back(hits.back() ? hits.back()->surface : sky);
     }
@@ -117,7 +119,9 @@ void CameraSensor::add_light(const SE3& T_WC, int first_row, int last_row, std::
       const auto i = static_cast<std::size_t>(v - first_row + 1) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(u + 1);
       const PixelRay ray = ray_of(u, v, T_WC.R);
       light[static_cast<std::size_t>(v - first_row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u)] +=
-          is_edge(i) ? light_of_edge(T_WC.p, ray) : hits[i] ? world_.radiance(*hits[i], ray, config_.camera.blur) : world_.sky();
+          is_edge(i) ? light_of_edge(T_WC.p, ray)
+          : hits[i]  ? world_.radiance(*hits[i], ray, config_.camera.blur)
+                     : world_.sky();
     }
   }
 }

@@ -13,7 +13,8 @@ namespace kilvo::test {
 /// The surfaces as far as the LiDAR can see them from somewhere on its way, in the estimator's world. `T_WR`: the simulated world there.
 inline VoxelMap known_world(const lab::Simulator& simulator, const SE3& T_WR, const MapConfig& config = {}) {
   std::vector<Eigen::Vector3d> stations;
-  for (double t = 0; t < simulator.duration(); t += 1) stations.push_back(simulator.walk().torso(t) * simulator.config().shape.T_torso_lidar.p);
+  for (double t = 0; t < simulator.duration(); t += 1)
+    stations.push_back(simulator.walk().torso(t) * simulator.config().shape.T_torso_lidar.p);
   const auto is_seen = [&](const Eigen::Vector3d& p, std::size_t surface) {
     return std::ranges::any_of(stations, [&](const Eigen::Vector3d& from) {
       const Eigen::Vector3d way = p - from;

@@ -86,7 +86,8 @@ struct PatchView {
 
  private:
   static std::optional<double> correlation_of(const std::vector<double>& a, const std::vector<double>& b) {
-    const Eigen::Map<const Eigen::ArrayXd> x(a.data(), static_cast<Eigen::Index>(a.size())), y(b.data(), static_cast<Eigen::Index>(b.size()));
+    const Eigen::Map<const Eigen::ArrayXd> x(a.data(), static_cast<Eigen::Index>(a.size())),
+        y(b.data(), static_cast<Eigen::Index>(b.size()));
     const Eigen::ArrayXd dx = x - x.mean(), dy = y - y.mean();
     constexpr double least_contrast = 10;  // grey levels
     if (std::sqrt(dx.square().mean()) < least_contrast) return std::nullopt;
@@ -112,7 +113,8 @@ struct PatchView {
 
   static bool is_white(const Image& image, int u, int v) {
     constexpr int white = 254;
-    return image.pixels[3 * (static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(u)) + 1] >= white;
+    return image.pixels[3 * (static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(u)) + 1] >=
+           white;
   }
 };
 

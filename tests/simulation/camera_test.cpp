@@ -63,7 +63,8 @@ TEST(WrittenCamera, EdgesAreWhereTheConfigurationSays) {
   for (const double turned : {-0.3, 0.0, 0.35}) {
     const SE3 T_WI{SO3::Exp({0.1 * turned, 0, turned}) * config.shape.T_torso_imu().R, {0, 0.1, 0.5}};
     const SE3 T_WT = T_WI * config.shape.T_torso_imu().inverse();
-    const Image image = camera.image(0, 0, [&](double) { return T_WT; }, Workers());
+    const Image image = camera.image(
+        0, 0, [&](double) { return T_WT; }, Workers());
     ASSERT_EQ(image.width, written.width);
     for (const lab::Surface& s : world.surfaces()) {
       const Eigen::Vector2d middle = pixel_of(written, T_WI, s.corner + s.u / 2 + s.v / 2);
