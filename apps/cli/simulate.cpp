@@ -25,6 +25,7 @@ void add_simulate(CLI::App& program, Action& chosen) {
   verb->add_option("--out", *out, "folder for the recording and the truth, created if need be")->type_name("DIR")->required();
   verb->add_option("--seed", options->seed, "of furniture, textures and noise; default: 1")->type_name("N");
   verb->add_option("--duration", options->duration, "end after so many seconds; default: when the walk ends")->type_name("S");
+  verb->add_option("--stride", options->stride, "every step so many times as long; default: 1")->type_name("X");
   verb->add_flag("--quiet", options->quiet, "no progress, only errors");
   verb->footer(list_of_scenarios());
   verb->callback([out, options, &chosen] { chosen = [out, options] { return simulate(*out, *options); }; });

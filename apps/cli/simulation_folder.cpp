@@ -30,6 +30,15 @@ const lab::Scenario& find_scenario(const std::string& name) {
   throw UsageError(fmt::format("no scenario '{}', nearest is '{}' (kilvo simulate --help lists them)", name, lab::nearest(name, names)));
 }
 
+lab::Scenario stretched(lab::Scenario scenario, double stride) {
+  if (!(stride > 0 && stride < 100)) throw UsageError("--stride must be above 0 and below 100");
+  for (lab::Stage& stage : scenario.stages) {
+    stage.gait.forward *= stride;
+    stage.gait.left *= stride;
+  }
+  return scenario;
+}
+
 std::string seconds(Time t) {
   std::string out;
   lab::append_seconds(out, t);
@@ -57,19 +66,25 @@ std::string numbers(std::initializer_list<Eigen::Vector3d> vectors) {
   return out;
 }
 
+/// Of the last image: a surface that reflects all light has the grey level 255 * total * light. Lamps here do not change.
+std::string exposure_line(const lab::Simulator& simulator) {
+  const lab::CameraModel& camera = simulator.config().camera;
+  const Time t = simulator.measured();
+  const double exposure_ms = 1e3 * lab::exposure_at(camera, simulator.seconds_of(t)), gain = 1e-3 * camera.gain;
+  return fmt::format("{},{:.6f},{:.6g},{:.9g},1", seconds(t), exposure_ms, gain, exposure_ms * gain);
+}
+
 void write_recording(const fs::path& folder, lab::Simulator& simulator, Progress& progress) {
   lab::RecordingWriter recording(folder / "recording.bag", lab::simulated_topics());
   CsvFile imu(folder / "imu_truth.csv", "t,gx,gy,gz,ax,ay,az,bgx,bgy,bgz,bax,bay,baz,vx,vy,vz");
-  CsvFile exposure(folder / "exposure.csv", "t,exposure_ms,gain");
+  CsvFile exposure(folder / "exposure.csv", "t,exposure_ms,gain,total,light");
   while (const auto measurement = simulator.next()) {
     recording.write(*measurement, simulator.arrived());
     if (sensor_of(*measurement) == Sensor::imu) {
       const lab::ImuTruth& truth = simulator.imu_truth();
       imu.write(seconds(truth.t) + numbers({truth.gyro, truth.accel, truth.gyro_bias, truth.accel_bias, truth.velocity}));
     } else if (sensor_of(*measurement) == Sensor::camera) {
-      const lab::CameraModel& camera = simulator.config().camera;
-      const Time t = simulator.measured();
-      exposure.write(fmt::format("{},{:.6f},{:.6g}", seconds(t), 1e3 * lab::exposure_at(camera, simulator.seconds_of(t)), camera.gain));
+      exposure.write(exposure_line(simulator));
     }
     progress.update(simulator.seconds_of(simulator.arrived()) / simulator.duration(), [] { return std::string("simulating"); });
   }
@@ -87,7 +102,7 @@ std::string list_of_scenarios() {
 }
 
 double simulate_into(const fs::path& folder, const SimulationOptions& options) {
-  const lab::Scenario& scenario = find_scenario(options.scenario);
+  const lab::Scenario scenario = stretched(find_scenario(options.scenario), options.stride);
   if (options.duration && !(*options.duration > 0 && *options.duration <= longest)) {
     throw UsageError(fmt::format("--duration must be above 0 and at most {} seconds", longest));
   }

@@ -13,6 +13,7 @@ struct SimulationOptions {
   std::int64_t seed = 1;           // of furniture, textures and noise
   std::optional<double> duration;  // s; until the walk ends by default
   bool quiet = false;              // no progress
+  double stride = 1;               // every step so many times as long as in the scenario
 };
 
 /// Writes recording.bag, gt.tum, contacts.gt.csv, imu_truth.csv, exposure.csv, robot.urdf and config.yaml into `folder`. Returns the

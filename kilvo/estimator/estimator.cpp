@@ -53,6 +53,11 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
   T_CI_ = robot.camera.T_imu_camera.inverse();
 }
 
+void Estimator::give_map(VoxelMap map) {
+  map_ = std::move(map);
+  map_is_given_ = true;
+}
+
 std::vector<Output> Estimator::push(Measurement m) {
   std::vector<Output> out;
   const Sensor s = sensor_of(m);

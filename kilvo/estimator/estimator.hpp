@@ -28,6 +28,10 @@ class Estimator {
   /// no sense (its name is in the text).
   Estimator(const Robot& robot, const EstimatorConfig& config, std::array<bool, sensor_count> used);
 
+  /// The surroundings are known: sweeps are registered to this map, in the estimator's world, and leave it as it is. Before the first
+  /// push.
+  void give_map(VoxelMap map);
+
   /// Takes a measurement in the order of its arrival; returns what became known, in time order.
   std::vector<Output> push(Measurement m);
 
@@ -64,6 +68,7 @@ class Estimator {
   void process_pending(Time until, std::vector<Output>& out);
   bool waits_for_scan(Time image, Time until) const;
   void process(const LidarScan& scan, Time end, std::vector<Output>& out);
+  void learn(const LidarModel& model, const std::vector<PointCluster>& clusters);  // the map grows
   void settle(const Estimate& e);  // nothing before it will be replayed
 
   // images.cpp
@@ -95,6 +100,7 @@ class Estimator {
   std::optional<Time> last_output_;
   Trajectory trajectory_;
   VoxelMap map_;
+  bool map_is_given_ = false;
   Workers workers_;
   MapError map_error_;
   PoseCovariance weak_ = PoseCovariance::Zero();  // takes a pose error to its part along what the last sweep did not know

@@ -30,6 +30,15 @@ void Estimator::settle(const Estimate& e) {
   replay_.forget_before(anchor_.t);
 }
 
+// The map grows by what a sweep saw, and takes over how uncertain the pose was.
+void Estimator::learn(const LidarModel& model, const std::vector<PointCluster>& clusters) {
+  const SE3 T_WI = estimate_->x.pose();
+  map_error_.registered(T_WI, model.by_epoch(), weak_);
+  const std::uint32_t epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
+  map_.insert(to_world(clusters, T_WI, robot_.lidar.T_imu_lidar.p, config_.lidar), epoch);
+  map_.forget(estimate_->x.p);
+}
+
 // Sweeps and images update the state at their own times, in the order of these: the middle of a sweep, the stamp of an image.
 void Estimator::process_pending(Time until, std::vector<Output>& out) {
   while (!pending_.empty() && pending_.front().end <= until) {
@@ -92,10 +101,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   if (good) {
     trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
     weak_ = weak_part(model.report().degeneracy);
-    map_error_.registered(T_WI, model.by_epoch(), weak_);
-    const std::uint32_t epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
-    map_.insert(to_world(clusters, T_WI, p_IL, config_.lidar), epoch);
-    map_.forget(estimate_->x.p);
+    if (!map_is_given_) learn(model, clusters);
     settle(*estimate_);
   }
   stages.map_us = watch.lap_us();

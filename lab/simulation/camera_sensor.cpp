@@ -13,6 +13,11 @@ constexpr double pi = std::numbers::pi;
 constexpr std::uint64_t stream = 41;
 constexpr std::size_t draws = 4096;  // of the noise table: 12 bits choose one
 
+// A pixel at an edge is seen by rays, at these quantiles of the Gaussian that blurs; what their number leaves out is in each of them. None
+// is a pixel away: so a pixel whose neighbours see what it sees needs none.
+constexpr std::array quantiles{-1.15, -0.32, 0.32, 1.15};
+constexpr double blur_of_ray = 0.53;
+
 struct NoSum {
   NoSum& operator+=(const NoSum&) { return *this; }
 };
@@ -50,8 +55,8 @@ double exposure_at(const CameraModel& m, double t) {
 
 CameraSensor::CameraSensor(const SimulatorConfig& config, const World& world) : config_(config), world_(world) {
   const CameraModel& m = config.camera;
-  for (int v = 0; v < m.height; ++v) {
-    for (int u = 0; u < m.width; ++u) directions_.emplace_back(unproject(m, {u, v}).cast<float>());
+  for (int v = -1; v <= m.height; ++v) {
+    for (int u = -1; u <= m.width; ++u) directions_.emplace_back(unproject(m, {u, v}).cast<float>());
   }
   Random random(config.seed, stream);
   double sum = 0, squares = 0;
@@ -59,6 +64,81 @@ CameraSensor::CameraSensor(const SimulatorConfig& config, const World& world) : 
   for (double& x : table) x = random.gaussian(), sum += x;
   for (double& x : table) x -= sum / draws, squares += x * x;
   for (const double x : table) gaussian_.push_back(static_cast<float>(x / std::sqrt(squares / draws)));
+}
+
+PixelRay CameraSensor::ray_of(int u, int v, const SO3& R_WC) const {
+  const auto at = [&](int x, int y) {
+    return directions_[static_cast<std::size_t>(y + 1) * static_cast<std::size_t>(config_.camera.width + 2) +
+                       static_cast<std::size_t>(x + 1)]
+        .cast<double>();
+  };
+  return {(R_WC * Eigen::Vector3d(at(u, v))).normalized(), R_WC * Eigen::Vector3d((at(u + 1, v) - at(u - 1, v)) / 2),
+          R_WC * Eigen::Vector3d((at(u, v + 1) - at(u, v - 1)) / 2)};
+}
+
+Colour CameraSensor::light_of_edge(const Eigen::Vector3d& origin, const PixelRay& ray) const {
+  Colour light = Colour::Zero();
+  // A grid turned a little: along an edge in any of the usual directions each ray counts by itself.
+  constexpr double c = 0.970, s = 0.243;
+  const double blur = config_.camera.blur;
+  for (const double a : quantiles) {
+    for (const double b : quantiles) {
+      const double x = blur * a, y = blur * b;
+      PixelRay part = ray;
+      part.direction = (ray.direction + (c * x - s * y) * ray.right + (s * x + c * y) * ray.down).normalized();
+      const auto hit = world_.cast(origin, part.direction);
+      light += hit ? world_.radiance(*hit, part, blur_of_ray * blur) : world_.sky();
+    }
+  }
+  return light / static_cast<float>(quantiles.size() * quantiles.size());
+}
+
+// Adds what the rows of pixels from `first_row` to before `last_row` see.
+void CameraSensor::add_light(const SE3& T_WC, int first_row, int last_row, std::vector<Colour>& light) const {
+  constexpr std::size_t sky = ~std::size_t{0};
+  const int width = config_.camera.width, columns = width + 2;
+  std::vector<std::size_t> seen;  // surfaces, of one pixel more on each side
+  std::vector<std::optional<Hit>> hits;
+  for (int v = first_row - 1; v <= last_row; ++v) {
+    for (int u = -1; u <= width; ++u) {
+      const auto& direction =
+          directions_[static_cast<std::size_t>(v + 1) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(u + 1)];
+      hits.push_back(world_.cast(T_WC.p, (T_WC.R * direction.cast<double>()).normalized()));
+      seen.push_back(hits.back() ? hits.back()->surface : sky);
+    }
+  }
+  const auto is_edge = [&](std::size_t i) {
+    const auto step = static_cast<std::size_t>(columns);
+    for (const std::size_t row : {i - step, i, i + step}) {
+      if (seen[row - 1] != seen[i] || seen[row] != seen[i] || seen[row + 1] != seen[i]) return true;
+    }
+    return false;
+  };
+  for (int v = first_row; v < last_row; ++v) {
+    for (int u = 0; u < width; ++u) {
+      const auto i = static_cast<std::size_t>(v - first_row + 1) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(u + 1);
+      const PixelRay ray = ray_of(u, v, T_WC.R);
+      light[static_cast<std::size_t>(v - first_row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u)] +=
+          is_edge(i) ? light_of_edge(T_WC.p, ray)
+          : hits[i]  ? world_.radiance(*hits[i], ray, config_.camera.blur)
+                     : world_.sky();
+    }
+  }
+}
+
+// Grey levels of the pixels from `first` on.
+void CameraSensor::expose(std::int64_t index, float brightness, std::size_t first, const std::vector<Colour>& light, Image& out) const {
+  const CameraModel& m = config_.camera;
+  const auto read = static_cast<float>(m.read_noise * m.read_noise), photon = static_cast<float>(m.photon_noise);
+  for (std::size_t k = 0; k < light.size(); ++k) {
+    const std::size_t i = first + k;
+    std::uint64_t bits = Random(config_.seed, stream + 1, static_cast<std::uint64_t>(index) * 10'000'019 + i).bits();
+    for (std::size_t c = 0; c < 3; ++c, bits >>= 12) {
+      const float grey = brightness * light[k][static_cast<int>(c)];
+      const float noisy = grey + std::sqrt(read + photon * grey) * gaussian_[bits % draws];
+      out.pixels[3 * i + c] = static_cast<std::uint8_t>(std::clamp(noisy + 0.5F, 0.0F, 255.0F));
+    }
+  }
 }
 
 Image CameraSensor::image(std::int64_t index, double t, const std::function<SE3(double)>& torso_at, const Workers& workers) const {
@@ -69,26 +149,14 @@ Image CameraSensor::image(std::int64_t index, double t, const std::function<SE3(
   poses.reserve(static_cast<std::size_t>(samples));
   for (int k = 0; k < samples; ++k) poses.push_back(torso_at(t + exposure * ((k + 0.5) / samples - 0.5)) * m.T_torso_camera);
   const auto brightness = static_cast<float>(255 * exposure * m.gain / samples);
-  const auto read = static_cast<float>(m.read_noise * m.read_noise), photon = static_cast<float>(m.photon_noise);
-  const double pixel_angle = 1 / m.fx;
+  const auto width = static_cast<std::size_t>(m.width), height = static_cast<std::size_t>(m.height);
 
-  Image out{m.width, m.height, 3, std::vector<std::uint8_t>(directions_.size() * 3)};
-  const auto expose = [&](std::size_t i) {
-    const Eigen::Vector3d direction = directions_[i].cast<double>();
-    Colour light = Colour::Zero();
-    for (const SE3& T : poses) {
-      const auto hit = world_.cast(T.p, (T.R * direction).normalized());
-      light += hit ? world_.radiance(*hit, pixel_angle) : world_.sky();
-    }
-    std::uint64_t bits = Random(config_.seed, stream + 1, static_cast<std::uint64_t>(index) * 10'000'019 + i).bits();
-    for (std::size_t c = 0; c < 3; ++c, bits >>= 12) {
-      const float grey = brightness * light[static_cast<int>(c)];
-      const float noisy = grey + std::sqrt(read + photon * grey) * gaussian_[bits % draws];
-      out.pixels[3 * i + c] = static_cast<std::uint8_t>(std::clamp(noisy + 0.5F, 0.0F, 255.0F));
-    }
-  };
-  workers.sum(directions_.size(), 4 * static_cast<std::size_t>(m.width), NoSum{}, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) expose(i);
+  Image out{m.width, m.height, 3, std::vector<std::uint8_t>(width * height * 3)};
+  constexpr std::size_t rows = 24;
+  workers.sum(height, rows, NoSum{}, [&](std::size_t first, std::size_t last) {
+    std::vector<Colour> light((last - first) * width, Colour::Zero());
+    for (const SE3& T : poses) add_light(T, static_cast<int>(first), static_cast<int>(last), light);
+    expose(index, brightness, first * width, light, out);
     return NoSum{};
   });
   return out;

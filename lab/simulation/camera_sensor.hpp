@@ -27,9 +27,14 @@ class CameraSensor {
   Image image(std::int64_t index, double t, const std::function<SE3(double)>& torso_at, const Workers& workers) const;
 
  private:
+  PixelRay ray_of(int u, int v, const SO3& R_WC) const;
+  void add_light(const SE3& T_WC, int first_row, int last_row, std::vector<Colour>& light) const;
+  Colour light_of_edge(const Eigen::Vector3d& origin, const PixelRay& ray) const;
+  void expose(std::int64_t index, float brightness, std::size_t first, const std::vector<Colour>& light, Image& out) const;
+
   const SimulatorConfig& config_;
   const World& world_;
-  std::vector<Eigen::Vector3f> directions_;  // by pixel, rows from the top
+  std::vector<Eigen::Vector3f> directions_;  // by pixel, rows from the top; one pixel more on each side than the image has
   std::vector<float> gaussian_;              // a table of draws, mean 0 and variance 1
 };
 

@@ -46,7 +46,8 @@ std::string simulated_config(const SimulatorConfig& config, const std::string& u
       "# The humanoid of `kilvo simulate`: 12 leg joints and the waist, IMU and a LiDAR that hangs upside down on the torso.\n";
   out += fmt::format("robot:\n  urdf: {}\n  feet:\n", urdf) + foot_line("left", shape) + foot_line("right", shape);
   out += fmt::format("\nimu:\n  topic: {}\n  rate: {}\n", topics[0], config.imu.delivery.rate);
-  out += "  gyro_noise: 0.0002  # its impacts ring softly: they do not alias as those of a real robot do\n  velocity_noise: 0.0004\n";
+  out += fmt::format("  gyro_noise: {}\n  accel_noise: {}\n", config.imu.gyro_noise, config.imu.accel_noise);
+  out += "  velocity_noise: 0.0002  # its impacts ring softly: they alias less than those of a real robot do\n";
   out += fmt::format("  T_link_imu:\n    link: torso_link\n    p: {}\n    R: {}\n", list_of(T_torso_imu.p), list_of(T_torso_imu.R));
   out += fmt::format("\nlegs:\n  topic: {}\n  type: joints\n  rate: {}\n", topics[1], config.joints.delivery.rate);
   out += fmt::format("\nlidar:\n  topic: {}\n  rate: {}\n  T_imu_lidar:\n    p: {}\n    R: {}\n", topics[2], config.lidar.delivery.rate,

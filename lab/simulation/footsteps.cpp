@@ -63,6 +63,8 @@ class Planner {
     print.creep = sign_of(side) * gait.creep * aside;
     print.heel_angle = gait.heel_strike;
     print.swing_lift = gait.lift;
+    print.swing_leaving = gait.leaving;
+    print.swing_landing = gait.landing;
     if (prints.back().lift <= prints.back().touch) throw PlanError(fmt::format("at {:.2f} s a foot would leave before it has come", now_));
     prints.push_back(print);
     add_frame(side);

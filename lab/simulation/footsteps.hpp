@@ -9,7 +9,7 @@
 
 namespace kilvo::lab {
 
-/// How a stage of the walk is walked. Lengths in m, times in s, angles in rad, accelerations in m/s^2.
+/// How a stage of the walk is walked. Lengths in m, times in s, speeds in m/s, angles in rad, accelerations in m/s^2.
 struct Gait {
   double forward = 0, left = 0, turn = 0;  // what one step adds to where the body is and looks
   double period = 0.55;                    // of one step
@@ -18,6 +18,8 @@ struct Gait {
   double hip_height = 0.555;               // over the ankles
   double sway = 0.03, bob = 0.012;         // of the pelvis, sideways with the stance foot and up in the middle of each step
   double roll = 0.02, pitch = 0.015, twist = 0.05, lean = 0.03;
+  double leaving = 0.15;                // speed at which a foot leaves the ground
+  double landing = 0.15;                // and at which it comes down
   double impact = 4;                    // the torso rings so hard at each touchdown
   double heel_strike = 0, toe_off = 0;  // the sole comes down on its heel, leaves over its toe
   double slip = 0, slip_time = 0.15;    // each stance of the left foot slides forward so far in so long
@@ -41,6 +43,7 @@ struct Footprint {
   Eigen::Vector3d creep = Eigen::Vector3d::Zero();          // m
   double heel_angle = 0, toe_angle = 0;                     // at touchdown, at lift-off; rad
   double swing_lift = 0;                                    // of the swing that ends here, m
+  double swing_leaving = 0, swing_landing = 0;              // its speeds up at its beginning and down at its end, m/s
 
   /// Displacement of the standing foot t seconds after touchdown, in the world.
   Eigen::Vector3d displacement(double t) const;

@@ -51,11 +51,13 @@ Gait running() {
 Gait climbing() {
   return {.period = 0.7,
           .double_support = 0.16,
-          .lift = 0.045,
+          .lift = 0.04,
           .hip_height = 0.515,
           .sway = 0.03,
           .bob = 0.006,
           .lean = 0.06,
+          .leaving = 0.1,
+          .landing = 0.1,
           .impact = 5,
           .toe_off = 0.35};
 }

@@ -52,6 +52,7 @@ struct CameraModel {
   double fx = 341.3, fy = 341.3, cx = 321.4, cy = 238.1;           // pixels
   std::array<double, 4> distortion{-0.05, 0.02, 0.0004, -0.0003};  // k1 k2 p1 p2
   SE3 T_torso_camera = mount();
+  double blur = 0.75;                           // pixels, sigma of the Gaussian that lens and pixel together blur like
   double exposure = 0.004;                      // s
   double gain = 230;                            // grey level of full reflectance = 255 * exposure * gain
   double exposure_swing = 0.25;                 // the exposure changes by up to this part of itself

@@ -1,7 +1,7 @@
 #include "lab/simulation/texture.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "lab/simulation/random.hpp"
@@ -12,6 +12,8 @@ namespace {
 constexpr int size = 1024;       // texels, a power of two
 constexpr double texel = 0.004;  // m
 constexpr double side = size * texel;
+// Variances of blurs in texels squared: of a copy, and of the cubic B-spline that joins its texels.
+constexpr double of_copy = 1.0 / 4, of_spline = 1.0 / 3;
 
 using Grid = std::vector<float>;
 
@@ -88,22 +90,53 @@ Grid paint(Pattern pattern, std::uint64_t seed) {
   return grid;
 }
 
-std::vector<std::uint8_t> rounded(const Grid& grid) {
-  std::vector<std::uint8_t> out(grid.size());
-  std::ranges::transform(grid, out.begin(),
-                         [](float v) { return static_cast<std::uint8_t>(std::lround(255 * std::clamp(v, 0.0F, 1.0F))); });
+// The columns before the first and after the last are there twice, so that a spline finds its four in a row.
+Grid with_wrapped_columns(const Grid& grid, std::size_t n) {
+  Grid out;
+  out.reserve(n * (n + 3));
+  for (std::size_t y = 0; y < n; ++y) {
+    for (std::size_t x = 0; x < n + 3; ++x) out.push_back(grid[y * n + (x + n - 1) % n]);
+  }
   return out;
 }
 
+// Every second value, after the weights 1 3 3 1 along rows and columns: hardly anything is left that so few values could not tell from
+// what is not there. If the variance of the blur was a quarter of a texel's square, it is a quarter of the new texel's.
 Grid halved(const Grid& grid, std::size_t n) {
-  Grid out(n * n / 4);
-  for (std::size_t y = 0; y < n / 2; ++y) {
-    for (std::size_t x = 0; x < n / 2; ++x) {
-      const float* p = &grid[2 * y * n + 2 * x];
-      out[y * (n / 2) + x] = (p[0] + p[1] + p[n] + p[n + 1]) / 4;
+  const auto mix = [](float a, float b, float c, float d) { return (a + 3 * (b + c) + d) / 8; };
+  const std::size_t half = n / 2;
+  Grid rows(n * half), out(half * half);
+  for (std::size_t y = 0; y < n; ++y) {
+    const float* p = &grid[n * y];
+    for (std::size_t x = 0; x < n; x += 2) rows[half * y + x / 2] = mix(p[(x + n - 1) % n], p[x], p[x + 1], p[(x + 2) % n]);
+  }
+  for (std::size_t y = 0; y < n; y += 2) {
+    const std::size_t before = (y + n - 1) % n, after = (y + 2) % n;
+    for (std::size_t x = 0; x < half; ++x) {
+      out[y / 2 * half + x] = mix(rows[half * before + x], rows[half * y + x], rows[half * (y + 1) + x], rows[half * after + x]);
     }
   }
   return out;
+}
+
+// Each value with a share of its neighbours, along rows and columns: adds `variance` (in texels squared) to the blur's.
+Grid softened(const Grid& grid, std::size_t n, double variance) {
+  const auto share = static_cast<float>(variance / 2);
+  Grid rows(grid.size()), out(grid.size());
+  const auto mix = [share](float before, float here, float after) { return here + share * (before - 2 * here + after); };
+  for (std::size_t y = 0; y < n; ++y) {
+    for (std::size_t x = 0; x < n; ++x) rows[y * n + x] = mix(grid[y * n + (x + n - 1) % n], grid[y * n + x], grid[y * n + (x + 1) % n]);
+  }
+  for (std::size_t y = 0; y < n; ++y) {
+    for (std::size_t x = 0; x < n; ++x) out[y * n + x] = mix(rows[(y + n - 1) % n * n + x], rows[y * n + x], rows[(y + 1) % n * n + x]);
+  }
+  return out;
+}
+
+// Of the four values around a place, `f` beyond the second of them: a cubic B-spline.
+Eigen::Array4f spline_weights(float f) {
+  const float g = 1 - f, f2 = f * f, g2 = g * g;
+  return {g2 * g / 6, (4 - 3 * f2 * (2 - f)) / 6, (4 - 3 * g2 * (2 - g)) / 6, f2 * f / 6};
 }
 
 }  // namespace
@@ -111,33 +144,42 @@ Grid halved(const Grid& grid, std::size_t n) {
 Texture::Texture(Pattern pattern, std::uint64_t seed) {
   Grid grid = paint(pattern, seed);
   for (float& value : grid) value = std::clamp(value, 0.0F, 1.0F);
+  grid = softened(grid, size, of_copy - 1.0 / 12);  // a painted texel is a box
   for (std::size_t n = size;; n /= 2) {
-    levels_.push_back(rounded(grid));
+    levels_.push_back(with_wrapped_columns(grid, n));
+    levels_.push_back(with_wrapped_columns(softened(grid, n, of_copy + of_spline), n));
     if (n == 1) break;
     grid = halved(grid, n);
   }
 }
 
-double Texture::bilinear(std::size_t level, double x, double y) const {
-  const double n = static_cast<double>(size >> level), px = x * n - 0.5, py = y * n - 0.5, fx = whole(px), fy = whole(py);
-  const auto mask = static_cast<std::size_t>((size >> level) - 1);
-  const auto i = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(fx)) & mask,
-             j = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(fy)) & mask;
-  const std::size_t i1 = (i + 1) & mask, j1 = ((j + 1) & mask) * (mask + 1), j0 = j * (mask + 1);
-  const auto& data = levels_[level];
-  const double wx = px - fx, wy = py - fy;
-  return ((1 - wy) * ((1 - wx) * data[j0 + i] + wx * data[j0 + i1]) + wy * ((1 - wx) * data[j1 + i] + wx * data[j1 + i1])) / 255;
+float Texture::spline(std::size_t level, double x, double y) const {
+  const auto n = static_cast<std::size_t>(size >> level / 2), mask = n - 1, stride = n + 3;
+  const double px = x * static_cast<double>(n) - 0.5, py = y * static_cast<double>(n) - 0.5, fx = whole(px), fy = whole(py);
+  const auto i = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(fx)) & mask;
+  const auto j = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(fy)) + mask;  // the row before, and never below zero
+  const Eigen::Array4f across = spline_weights(static_cast<float>(px - fx)), down = spline_weights(static_cast<float>(py - fy));
+  const float* texels = levels_[level].data() + i;
+  Eigen::Array4f sum = Eigen::Array4f::Zero();
+  for (std::size_t r = 0; r < 4; ++r) {
+    sum += down[static_cast<Eigen::Index>(r)] * Eigen::Map<const Eigen::Array4f>(texels + ((j + r) & mask) * stride);
+  }
+  return (across * sum).sum();
 }
 
-double Texture::level_for(double footprint) {
-  return std::clamp(std::log2(std::max(footprint, 1e-6) / texel), 0.0, std::log2(static_cast<double>(size)));
+// From copy to copy the variance doubles. Between two of them, shares of both have the variance that is wanted.
+Texture::Blur Texture::blur_of(double sigma) {
+  constexpr double finest = texel * texel * (of_copy + of_spline);
+  const double ratio = std::max(sigma * sigma / finest, 1.0);
+  const int level = std::ilogb(ratio), coarsest = 2 * std::ilogb(static_cast<double>(size));
+  if (level >= coarsest) return {static_cast<std::size_t>(coarsest), 0};
+  return {static_cast<std::size_t>(level), static_cast<float>(std::ldexp(ratio, -level) - 1)};
 }
 
-double Texture::at(double u, double v, double level) const {
+float Texture::at(double u, double v, const Blur& blur) const {
   const double x = u / side - whole(u / side), y = v / side - whole(v / side);
-  const auto below = std::min(static_cast<std::size_t>(level), levels_.size() - 2);
-  const double f = level - static_cast<double>(below), fine = bilinear(below, x, y);
-  return f > 0 ? fine + f * (bilinear(below + 1, x, y) - fine) : fine;
+  const float fine = spline(blur.level, x, y);
+  return blur.next > 0.01F ? fine + blur.next * (spline(blur.level + 1, x, y) - fine) : fine;
 }
 
 }  // namespace kilvo::lab

@@ -13,16 +13,22 @@ class Texture {
  public:
   Texture(Pattern pattern, std::uint64_t seed);
 
-  /// Which copy is the right one for a pixel that sees `footprint` metres of the surface; between two of them: some of both.
-  static double level_for(double footprint);
+  /// Some of one copy and some of the next one.
+  struct Blur {
+    std::size_t level = 0;
+    float next = 0;
+  };
+  /// What looks as if seen through a Gaussian of `sigma` metres on the surface.
+  static Blur blur_of(double sigma);
 
   /// Between 0 and 1 at (u, v), in metres on the surface; repeats every 4.1 m.
-  double at(double u, double v, double level) const;
+  float at(double u, double v, const Blur& blur) const;
 
  private:
-  double bilinear(std::size_t level, double x, double y) const;
+  float spline(std::size_t level, double x, double y) const;
 
-  std::vector<std::vector<std::uint8_t>> levels_;  // each half as wide as the one before
+  // Each with twice the blur's variance of the one before, every second half as wide; three columns come again at the end of each row.
+  std::vector<std::vector<float>> levels_;
 };
 
 }  // namespace kilvo::lab

@@ -35,14 +35,18 @@ SE3 pivot(double x, double z, double angle) {
   return {R, edge - R * edge};
 }
 
-// From where the foot left to where it comes down; u from 0 to 1. Up first, then across; down last.
-SE3 swing(const SE3& from, const SE3& to, double lift, double u) {
+// From where the foot left to where it comes down; u from 0 to 1. Up first, then across; down last. Up and down not from and to rest: the
+// ground holds a foot, and stops it.
+SE3 swing(const SE3& from, const Footprint& next, double lasts, double u) {
+  const SE3& to = next.sole;
   const double rise = to.p.z() - from.p.z();
   constexpr double step_edge = 0.02;  // m
   const double across = smooth_step((u - (rise > step_edge ? 0.16 : 0.05)) / (std::abs(rise) > step_edge ? 0.79 : 0.9));
   const double up = rise > step_edge ? smooth_step(u / 0.5) : rise < -step_edge ? smooth_step((u - 0.5) / 0.5) : smooth_step(u);
   SE3 out{from.R * SO3::Exp(across * (from.R.inverse() * to.R).Log()), from.p + across * (to.p - from.p)};
-  out.p.z() = from.p.z() + up * rise + lift * smooth_bump(u);
+  out.p.z() = from.p.z() + up * rise + next.swing_lift * smooth_bump(u);
+  const double back = 1 - u;
+  out.p.z() += lasts * u * back * (next.swing_leaving * back * back + next.swing_landing * u * u);
   return out;
 }
 
@@ -139,7 +143,8 @@ SE3 Walk::foot(Side side, double t) const {
   if (i + 1 < prints.size()) {
     const Footprint& next = prints[i + 1];
     const double middle = (print.lift + next.touch) / 2;
-    if (t > print.lift) sole = swing(sole, next.sole, next.swing_lift, (t - print.lift) / (next.touch - print.lift));
+    const double lasts = next.touch - print.lift;
+    if (t > print.lift) sole = swing(sole, next, lasts, (t - print.lift) / lasts);
     const double toe = (t - print.lift + roll_time) / (middle - print.lift + roll_time);
     const double heel = (t - middle) / (next.touch + roll_time - middle);
     tilt = pivot(shape_.toe, 0, print.toe_angle * smooth_bump(toe)) * pivot(shape_.heel, 0, -next.heel_angle * smooth_bump(heel));

@@ -140,12 +140,23 @@ TEST(Walk, ASwingingFootClearsTheGround) {
   for (const Eigen::Vector3d& corner : walk.shape().sole()) EXPECT_GT((walk.foot(Side::left, middle) * corner).z(), 0.05);
 }
 
+// What tells a sole's contact from a sole that hovers: it comes with a speed, and rests the next moment.
+TEST(Walk, FeetLeaveAndLandWithSpeed) {
+  const Walk walk = walk_of("forward");
+  const Footprint& print = walk.plan().prints[0][3];
+  const auto speed = [&](double t) { return (walk.foot(Side::left, t + 1e-4).p - walk.foot(Side::left, t - 1e-4).p).z() / 2e-4; };
+  EXPECT_NEAR(speed(print.touch - 1e-3), -0.15, 0.02);
+  EXPECT_EQ(speed(print.touch + 1e-3), 0);
+  EXPECT_EQ(speed(print.lift - 1e-3), 0);
+  EXPECT_NEAR(speed(print.lift + 1e-3), 0.15, 0.02);
+}
+
 TEST(Walk, ASlippingFootSlidesAndTheNextStepBeginsThere) {
   const Walk walk = walk_of("slip");
   const Footprint& print = walk.plan().prints[0][3];
   const double slid = (walk.foot(Side::left, print.lift).p - walk.foot(Side::left, print.touch).p).norm();
   EXPECT_NEAR(slid, 0.03, 1e-6);
-  EXPECT_LT((walk.foot(Side::left, print.lift + 1e-4).p - walk.foot(Side::left, print.lift).p).norm(), 1e-6);
+  EXPECT_LT((walk.foot(Side::left, print.lift + 1e-6).p - walk.foot(Side::left, print.lift).p).norm(), 1e-6);
 }
 
 TEST(Walk, WhatTheLegsCannotDoIsAnErrorThatSaysWhenAndWhy) {

@@ -1,5 +1,6 @@
 #include "lab/simulation/world.hpp"
 
+#include <array>
 #include <cmath>
 #include <embree3/rtcore.h>
 #include <numbers>
@@ -8,6 +9,60 @@
 #include "lab/simulation/random.hpp"
 
 namespace kilvo::lab {
+
+namespace {
+
+constexpr int most_looks = 24;
+
+// Circles in a row with weights like an upturned parabola, which let through little of what is finer than a pixel.
+struct Row {
+  std::array<float, most_looks> weights{};
+  double apart = 0;  // for a standard deviation of 1
+};
+
+const std::array<Row, most_looks + 1>& rows() {
+  static const std::array<Row, most_looks + 1> all = [] {
+    std::array<Row, most_looks + 1> out;
+    out[1].weights[0] = 1;
+    for (int n = 2; n <= most_looks; ++n) {
+      const auto place = [n](int k) { return (2.0 * k + 1 - n) / n; };
+      double sum = 0, squares = 0;
+      for (int k = 0; k < n; ++k) sum += 1 - place(k) * place(k);
+      Row& row = out[static_cast<std::size_t>(n)];
+      for (int k = 0; k < n; ++k) {
+        const double weight = (1 - place(k) * place(k)) / sum;
+        row.weights[static_cast<std::size_t>(k)] = static_cast<float>(weight);
+        squares += weight * place(k) * place(k);
+      }
+      row.apart = 2.0 / n / std::sqrt(squares);
+    }
+    return out;
+  }();
+  return all;
+}
+
+// An ellipse on a surface as a row of circles.
+struct Looks {
+  int count = 1;
+  double sigma = 0;       // m, of each circle
+  Eigen::Vector2d apart;  // m
+};
+
+// `right`, `down`: what a pixel is on the surface; `blur`: of the Gaussian, in pixels.
+Looks looks_through(const Eigen::Vector2d& right, const Eigen::Vector2d& down, double blur) {
+  constexpr double per_sigma = 1.8, round = 1.15, longest = most_looks / per_sigma;
+  const double a = right.x() * right.x() + down.x() * down.x(), c = right.y() * right.y() + down.y() * down.y();
+  const double b = right.x() * right.y() + down.x() * down.y(), middle = (a + c) / 2, spread = std::sqrt((a - c) * (a - c) / 4 + b * b);
+  const double large = blur * blur * (middle + spread), small = std::max(blur * blur * (middle - spread), large / (longest * longest));
+  if (large < round * round * small) return {1, std::sqrt((large + small) / 2), Eigen::Vector2d::Zero()};
+  // The row's variance makes up for what the circles lack.
+  const double lack = std::sqrt(large - small), sigma = std::sqrt(small);
+  const int count = std::clamp(static_cast<int>(std::ceil(per_sigma * lack / sigma)), 2, most_looks);
+  const Eigen::Vector2d along = a > c ? Eigen::Vector2d((a - c) / 2 + spread, b) : Eigen::Vector2d(b, (c - a) / 2 + spread);
+  return {count, sigma, rows()[static_cast<std::size_t>(count)].apart * lack * along.normalized()};
+}
+
+}  // namespace
 
 struct World::Rays {
   explicit Rays(const std::vector<Surface>& surfaces) : device(rtcNewDevice(nullptr)), scene(rtcNewScene(device)) {
@@ -126,26 +181,26 @@ std::optional<Hit> World::cast(const Eigen::Vector3d& origin, const Eigen::Vecto
   const Eigen::Vector3d x = origin + hit.range * direction - face.corner;
   hit.u = x.dot(face.u);
   hit.v = x.dot(face.v);
-  hit.heading = {direction.dot(face.u), direction.dot(face.v)};
   return hit;
 }
 
-Colour World::radiance(const Hit& hit, double pixel) const {
+Colour World::radiance(const Hit& hit, const PixelRay& ray, double blur) const {
   const Material& material = scene_.materials[scene_.surfaces[hit.surface].material];
   const Face& face = faces_[hit.surface];
-  constexpr double lens = 1.5;  // pixels; a lens blurs so much
-  // A pixel sees an ellipse, long where the surface is grazed: several round looks along it.
-  const double across = lens * hit.range * pixel, along = across / std::max(hit.cosine, 0.05);
-  const int looks = std::clamp(static_cast<int>(1.2 * along / across) + 1, 1, 8);
-  const double level = Texture::level_for(std::max(across, along / looks));
-  const Eigen::Vector2d middle = Eigen::Vector2d(hit.u, hit.v) + face.offset, heading = hit.heading.normalized();
+  // How far a pixel to the right and a pixel down are on the surface.
+  const double along = face.normal.dot(ray.direction);
+  const auto on_surface = [&](const Eigen::Vector3d& change) {
+    const Eigen::Vector3d d = hit.range * (change - face.normal.dot(change) / along * ray.direction);
+    return Eigen::Vector2d(d.dot(face.u), d.dot(face.v));
+  };
+  const Looks looks = looks_through(on_surface(ray.right), on_surface(ray.down), blur);
+  const Texture::Blur each = Texture::blur_of(looks.sigma);
   const Texture& texture = textures_[static_cast<std::size_t>(material.pattern)];
-  double tone = 0;
-  for (int k = 0; k < looks; ++k) {
-    const Eigen::Vector2d at = middle + along * ((k + 0.5) / looks - 0.5) * heading;
-    tone += texture.at(at.x(), at.y(), level) / looks;
-  }
-  return face.shade * (material.dark + static_cast<float>(tone) * (material.bright - material.dark));
+  Eigen::Vector2d at = Eigen::Vector2d(hit.u, hit.v) + face.offset - (looks.count - 1) / 2.0 * looks.apart;
+  const auto& weights = rows()[static_cast<std::size_t>(looks.count)].weights;
+  float tone = 0;
+  for (int k = 0; k < looks.count; ++k, at += looks.apart) tone += weights[static_cast<std::size_t>(k)] * texture.at(at.x(), at.y(), each);
+  return face.shade * (material.dark + tone * (material.bright - material.dark));
 }
 
 double World::reflectivity(const Hit& hit) const { return scene_.materials[scene_.surfaces[hit.surface].material].reflectivity; }

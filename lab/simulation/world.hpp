@@ -45,11 +45,15 @@ struct Scene {
 };
 
 struct Hit {
-  double range = 0;                                   // m
-  std::size_t surface = 0;                            // index into World::surfaces()
-  double u = 0, v = 0;                                // m along the surface's edges
-  double cosine = 1;                                  // of the angle of incidence
-  Eigen::Vector2d heading = Eigen::Vector2d::Zero();  // of the ray along the surface, in the directions of u and v
+  double range = 0;         // m
+  std::size_t surface = 0;  // index into World::surfaces()
+  double u = 0, v = 0;      // m along the surface's edges
+  double cosine = 1;        // of the angle of incidence
+};
+
+/// The ray of a pixel in the world, and what is added to its direction from this pixel to the next one on the right and below.
+struct PixelRay {
+  Eigen::Vector3d direction, right, down;
 };
 
 class World {
@@ -61,8 +65,8 @@ class World {
   /// The nearest surface along a unit direction, at least 5 cm away. May be called by several threads.
   std::optional<Hit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
-  /// Light that comes from there; a pixel sees an angle of `pixel` radians.
-  Colour radiance(const Hit& hit, double pixel) const;
+  /// Light that comes from there, through a Gaussian of `blur` pixels: of the surface that is an ellipse, long where it is grazed.
+  Colour radiance(const Hit& hit, const PixelRay& ray, double blur) const;
   const Colour& sky() const { return scene_.sky; }
   double reflectivity(const Hit& hit) const;
 

@@ -29,6 +29,7 @@ struct Simulated {
     EXPECT_EQ(lines_in(file("contacts.gt.csv")), 5002U);
     EXPECT_EQ(lines_in(file("imu_truth.csv")), 1002U);
     EXPECT_EQ(lines_in(file("exposure.csv")), 52U);
+    EXPECT_THAT(read_text(file("exposure.csv")), HasSubstr("t,exposure_ms,gain,total,light\n1700000000.000000000,4.000000,0.23,0.92,1\n"));
     EXPECT_THAT(read_text(file("contacts.gt.csv")), AllOf(HasSubstr("t,left,right\n1700000000.000000000,1,1\n"), HasSubstr(",0,1\n")));
   }
 
@@ -142,6 +143,21 @@ TEST(Simulate, WhatCannotBeDoneIsSaid) {
   expect_error({"simulate", "room", "--out", "/proc/nowhere", "--duration", "1"}, "/proc/nowhere: cannot be created");
   write_text(folder / "file", "");
   expect_error({"simulate", "room", "--out", folder / "file", "--duration", "1"}, "file");
+}
+
+// A plan that the legs cannot follow is refused before anything is written; one that they can is another walk.
+TEST(Simulate, AStepThatCannotBeReachedIsSaid) {
+  const TemporaryFolder folder;
+  const Finished f = kilvo({"simulate", "room", "--stride", "3", "--out", folder / "x", "--duration", "1"});
+  EXPECT_EQ(f.code, 2);
+  EXPECT_THAT(f.err, AllOf(HasSubstr("room: the walk cannot be done: at "), HasSubstr("from its hip, the leg reaches 0.600 m")));
+  EXPECT_FALSE(std::filesystem::exists(folder / "x"));
+  for (const char* stride : {"0", "-1", "nan", "1000"}) {
+    const Finished refused = kilvo({"simulate", "room", "--stride", stride, "--out", folder / "x"});
+    EXPECT_EQ(refused.code, 2) << stride;
+    EXPECT_THAT(refused.err, HasSubstr("--stride must be above 0"));
+  }
+  EXPECT_EQ(kilvo({"simulate", "room", "--stride", "0.5", "--out", folder / "x", "--duration", "0.2"}).code, 0);
 }
 
 TEST(Simulate, HelpListsTheScenarios) {
