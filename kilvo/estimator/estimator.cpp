@@ -60,22 +60,17 @@ void Estimator::give_map(VoxelMap map) {
 
 std::vector<Output> Estimator::push(Measurement m) {
   std::vector<Output> out;
+  push(std::move(m), out);
+  return out;
+}
+
+void Estimator::push(Measurement m, std::vector<Output>& out) {
   const Sensor s = sensor_of(m);
-  if (!used_[static_cast<std::size_t>(s)]) {
-    drop(s, "not used");
-    return out;
-  }
-  if (const char* fault = fault_of(m)) {
-    drop(s, fault);
-    return out;
-  }
-  if (const auto refused = timeline_.push(std::move(m))) {
-    drop(s, *refused);
-    return out;
-  }
+  if (!used_[static_cast<std::size_t>(s)]) return drop(s, "not used");
+  if (const char* fault = fault_of(m)) return drop(s, fault);
+  if (const auto refused = timeline_.push(std::move(m))) return drop(s, *refused);
   for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, "time jump");
   while (auto next = timeline_.pop()) handle(*next, out);
-  return out;
 }
 
 std::vector<Output> Estimator::finish() {
