@@ -103,6 +103,11 @@ std::vector<Output> Estimator::finish() {
 // A sensor that was there and of little use is what the user must know of first.
 void Estimator::warn_of_unused_sensors() {
   constexpr std::uint64_t few = 20;  // messages
+  const std::uint64_t legs = statistics_.sensors[static_cast<std::size_t>(Sensor::legs)].used;
+  if (statistics_.refused_stances > few && 10 * statistics_.refused_stances > legs) {
+    statistics_.warnings.push_back("legs: standing feet seemed to move in " + std::to_string(100 * statistics_.refused_stances / legs) +
+                                   " % of the messages and were left out: is the mount of the IMU right, and the URDF this robot's?");
+  }
   for (int i = 0; i < sensor_count; ++i) {
     const SensorCount& sensor = statistics_.sensors[static_cast<std::size_t>(i)];
     const auto weight = [](const auto& cause) { return cause.first == "before the start" || cause.first == "not used" ? 0 : cause.second; };

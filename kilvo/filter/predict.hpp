@@ -45,7 +45,7 @@ struct ProcessNoise {
         Field{"gyro_bias_walk", &ProcessNoise::gyro_bias, "rad/s/sqrt(s)", "random walk of the gyro bias"},
         Field{"accel_bias_walk", &ProcessNoise::accel_bias, "m/s^2/sqrt(s)", "random walk of the accelerometer bias"},
         Field{"foot_noise", &ProcessNoise::foot, "m/sqrt(s)", "random walk of a standing foot"},
-        Field{"vertical_foot_noise", &ProcessNoise::foot_vertical, "m/sqrt(s)", "the same along the vertical"},
+        Field{"foot_noise_vertical", &ProcessNoise::foot_vertical, "m/sqrt(s)", "the same along the vertical"},
         Field{"exposure_walk", &ProcessNoise::exposure, "1/sqrt(s)", "random walk of the relative inverse exposure"}};
   }
 };

@@ -17,7 +17,7 @@ struct LegConfig {
   double velocity_correlation = 0.2;       // s
   double position_sigma = 0.001;           // m
   double position_correlation = 0.5;       // s
-  double ground_sigma = 0.01;              // m
+  double ground_sigma = 0.02;              // m
   double entry_delay = 0.015;              // s
   double gate = 5.0;
 

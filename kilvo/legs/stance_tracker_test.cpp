@@ -7,6 +7,7 @@
 #include "kilvo/filter/predict.hpp"
 #include "kilvo/filter/update.hpp"
 #include "kilvo/legs/leg_measurements.hpp"
+#include "tests/helpers/surface_groups.hpp"
 #include "tests/helpers/synthetic_gait.hpp"
 
 namespace kilvo {
@@ -295,6 +296,33 @@ TEST(StanceTracker, AFootWhoseEncodersAreFrozenWhileTheBodyTurnsIsNotUsed) {
     }
     EXPECT_EQ(step.foot[0].used, rate == 0) << "a robot at rest may repeat itself";
     EXPECT_EQ(tracker.standing(1), true);
+  }
+}
+
+TEST(StanceTracker, TheGroundCountsOnceAtEachTouchdownAndOnlyWhereThereIsAMap) {
+  const MapConfig map_config;
+  VoxelMap map(map_config);
+  const auto floor = test::groups_of(test::points_on({-1, -1, 0}, {5, 0, 0}, {0, 2, 0}, 0.04), map_config.voxel_size / 4, 1e-5);
+  for (int i = 0; i < 3; ++i) map.insert(floor, 0);
+  test::Gait gait;
+  for (const VoxelMap* ground : {static_cast<const VoxelMap*>(nullptr), static_cast<const VoxelMap*>(&map)}) {
+    LegConfig config;
+    ContactEstimator contacts(config);
+    StanceTracker tracker(config);
+    int entered = 0, with_ground = 0;
+    for (int i = 0; i < 4000; ++i) {
+      const double s = 1e-3 * i;
+      const Feet feet = gait.feet(s);
+      contacts.update(feet, gait.body(s), Eigen::Vector3d::Zero(), level_imu.accel);
+      const LegStep step = tracker.step(feet, contacts, gait.body(s), Eigen::Vector3d::Zero(), 0, ground);
+      for (const Stance& foot : step.foot) {
+        entered += foot.begins ? 1 : 0;
+        with_ground += foot.ground ? 1 : 0;
+        EXPECT_TRUE(!foot.ground || (foot.begins && std::abs(foot.ground->height_of({2, 0, 0})) < 0.005));
+      }
+    }
+    EXPECT_GT(entered, 5);
+    EXPECT_EQ(with_ground, ground == nullptr ? 0 : entered);
   }
 }
 

@@ -39,7 +39,7 @@ const std::map<std::string_view, Range>& ranges() {
       {"legs.entry_delay", up_to(1)},
       {"legs.gate", above_zero()},
       {"legs.foot_noise", up_to(any)},
-      {"legs.vertical_foot_noise", up_to(any)},
+      {"legs.foot_noise_vertical", up_to(any)},
       {"lidar.rate", above_zero(1000)},
       {"lidar.time_offset", {-10, 10}},
       {"lidar.min_range", up_to(1000)},
