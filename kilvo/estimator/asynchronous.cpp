@@ -82,17 +82,16 @@ void Estimator::lose_legs(Time t) {
 
 // On the legs alone a wrong velocity makes standing feet look as if they moved, so that they are not used, and nothing mends it. No flight
 // lasts this long: the velocity is taken as unknown, and the feet as standing.
-void Estimator::keep_a_foothold(Time t, const Contacts& contacts, const std::array<bool, 2>& passed) {
-  constexpr Duration longest_flight = std::chrono::milliseconds(500), longest_refusal = std::chrono::milliseconds(200);
-  if (passed[0] || passed[1] || modality_ != Modality::ki) last_stance_ = t;
-  const bool stands = contacts.on[0] || contacts.on[1];
-  if (t - last_stance_ < (stands ? longest_refusal : longest_flight)) return;
+void Estimator::keep_a_foothold(const LegStep& step, const std::array<bool, 2>& passed) {
+  constexpr Duration longest_flight = std::chrono::milliseconds(500);
+  if (passed[0] || passed[1] || modality_ != Modality::ki) last_stance_ = step.t;
+  if (step.t - last_stance_ < longest_flight) return;
   constexpr double unknown_velocity = 1.0;  // m/s
   for (Estimate* e : {&*estimate_, &closed_}) e->P.diagonal().segment<3>(at::v).array() += unknown_velocity * unknown_velocity;
   settle(closed_);
   contacts_.restart();
   stances_.restart();
-  last_stance_ = t;
+  last_stance_ = step.t;
   ++statistics_.lost_stances;
 }
 
@@ -114,8 +113,9 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   const double sigma_v = std::sqrt(std::max(0.0, estimate_->P.block<3, 3>(at::v, at::v).trace() / 3));
   const Contacts& contacts = contacts_.update(feet, x, omega, replay_.newest_imu().accel - x.ba, sigma_v, &map_);
   const double contact_us = watch.lap_us();
-  // Beside a LiDAR the ground under a foot tells nothing new: it is of the same map.
-  const LegStep step = stances_.step(feet, contacts_, x, omega, sigma_v, modality_ == Modality::ki ? &map_ : nullptr);
+  // Beside a LiDAR the ground under a foot tells nothing new of the height, but how the feet stand on it.
+  const auto ground = modality_ == Modality::ki ? StanceTracker::Ground::use : StanceTracker::Ground::learn;
+  const LegStep step = stances_.step(feet, contacts_, x, omega, sigma_v, &map_, ground);
   replay_.add(step);
   const std::array<bool, 2> passed = replay_.apply(*estimate_, step);
   stances_.judge(step, passed);
@@ -127,7 +127,7 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   const double after_us = watch.lap_us();
 
   choose_modality(s.t);
-  keep_a_foothold(s.t, contacts, passed);
+  keep_a_foothold(step, passed);
   emit(out, contacts, before_us + contact_us + after_us + std::exchange(closing_us_, 0), contact_us);
 }
 

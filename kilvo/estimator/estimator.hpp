@@ -66,7 +66,7 @@ class Estimator {
   void handle_imu(ImuSample s, std::vector<Output>& out);
   void handle_legs(const JointSample& s, std::vector<Output>& out);
   void lose_legs(Time t);
-  void keep_a_foothold(Time t, const Contacts& contacts, const std::array<bool, 2>& passed);
+  void keep_a_foothold(const LegStep& step, const std::array<bool, 2>& passed);
   void choose_modality(Time t);
 
   // sequential.cpp: sweeps

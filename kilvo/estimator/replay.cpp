@@ -91,7 +91,7 @@ std::array<bool, 2> Replay::apply(Estimate& e, const LegStep& step) const {
   if (!any || imu_.empty()) return {};
   // Without a rate the velocity of a foot that is a leg away from the IMU is anything.
   const auto gyro = gyro_at(step.t);
-  if (!gyro) return {};
+  if (!gyro) return {step.foot[0].used, step.foot[1].used};
   LegModel model(step, *gyro, config_.legs);
   // The rows are nearly linear: one iteration.
   UpdateConfig once;

@@ -29,7 +29,7 @@ class Replay {
   /// Predicts e to `until` without looking at the legs.
   void predict_to(Estimate& e, Time until, Trajectory* record) const;
 
-  /// Applies one leg step to e, which must be of its time. Returns which feet of it were used.
+  /// Applies one leg step to e, which must be of its time. Returns which feet of it were used and not refused.
   std::array<bool, 2> apply(Estimate& e, const LegStep& step) const;
 
   /// What is not needed by estimates of `t` and later.

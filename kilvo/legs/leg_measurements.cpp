@@ -17,6 +17,8 @@ constexpr Duration longest_refusal = std::chrono::milliseconds(20);
 // Encoders that repeat every bit for so long, while the other foot's do not and the body turns faster than this (rad/s), are frozen.
 constexpr Duration longest_stillness = std::chrono::milliseconds(50);
 constexpr double surely_turning = 0.1;
+// How much one touchdown counts in what is learned of the ground.
+constexpr double sink_share = 0.15;
 // A foot enters loosely and settles over this time, s.
 constexpr double entry_time = 0.02;
 constexpr double shortest_step = 1e-4, longest_step = 0.05;  // s
@@ -161,6 +163,23 @@ void StanceTracker::judge(const LegStep& step, const std::array<bool, 2>& passed
   }
 }
 
+// A sole sinks into soft ground, grass hides it from the LiDAR, few points near the robot make a plane that is off: all of that is alike
+// from step to step, so what it was while the LiDAR knew the height is taken off when it does not.
+std::optional<GroundPatch> StanceTracker::ground_under(const VoxelMap& map, const Eigen::Vector3d& p_W, const Eigen::Vector3d& up_W,
+                                                       Ground ground) {
+  auto patch = GroundLookup::of_map(map, p_W, up_W);
+  if (!patch) return std::nullopt;
+  if (ground == Ground::learn) {
+    const double off = patch->height_of(p_W) - sink_;
+    sink_ += sink_share * off;
+    sink_variance_ += sink_share * (off * off - sink_variance_);
+    return std::nullopt;
+  }
+  patch->point += sink_ * patch->normal;
+  patch->sigma = std::sqrt(patch->sigma * patch->sigma + sink_variance_);
+  return patch;
+}
+
 // A foot that slid away stands again when it is slow.
 bool StanceTracker::may_stand(std::size_t side, double speed2, double sigma_v) {
   const double rest2 = loosest * config_.velocity_sigma * config_.velocity_sigma + config_.gate * config_.gate * sigma_v * sigma_v;
@@ -178,7 +197,7 @@ bool StanceTracker::stuck(std::size_t side, const Feet& feet, const Eigen::Vecto
 }
 
 LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega,
-                            double sigma_v, const VoxelMap* map) {
+                            double sigma_v, const VoxelMap* map, Ground ground) {
   LegStep out;
   out.t = feet.t;
   out.dt = last_ ? std::clamp(to_seconds(feet.t - *last_), shortest_step, longest_step) : longest_step;
@@ -217,7 +236,7 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
       if (!foot.begins) foot.shift += (weights[k] - (*weights_[side])[k]) * pose.p[k];
     }
     weights_[side] = weights;
-    if (foot.begins && map != nullptr) foot.ground = GroundLookup::of_map(*map, x.pose() * foot.point.p, -x.g.normalized());
+    if (foot.begins && map != nullptr) foot.ground = ground_under(*map, x.pose() * foot.point.p, -x.g.normalized(), ground);
     // Eq. 8: what moves is believed less; so is what has just arrived.
     const double moving2 = velocity_W(x, foot.point.p, foot.point.v, omega).squaredNorm();
     const double entering = std::max(0.0, 1.0 - (phase - config_.entry_delay) / entry_time);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 
 #include "kilvo/filter/measurement_rows.hpp"
@@ -88,10 +89,12 @@ class StanceTracker {
  public:
   explicit StanceTracker(const LegConfig& config) : config_(config) {}
 
-  /// `omega`: bias-free, rad/s. `sigma_v`: uncertainty of the velocity of x, m/s. `map`: on whose planes the feet come down; none when
-  /// their height is known better without.
+  /// Whether the map's ground holds the feet, or how they stand on it is learned, since the height is known better without.
+  enum class Ground : std::uint8_t { use, learn };
+
+  /// `omega`: bias-free, rad/s. `sigma_v`: uncertainty of the velocity of x, m/s. `map`: on whose planes the feet come down.
   LegStep step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0,
-               const VoxelMap* map = nullptr);
+               const VoxelMap* map = nullptr, Ground ground = Ground::use);
 
   /// Both feet leave the filter at the next step, to enter anew.
   void restart();
@@ -102,11 +105,13 @@ class StanceTracker {
 
  private:
   using Weights = std::array<double, max_corners>;
+  std::optional<GroundPatch> ground_under(const VoxelMap& map, const Eigen::Vector3d& p_W, const Eigen::Vector3d& up_W, Ground ground);
   bool may_stand(std::size_t side, double speed2, double sigma_v);
   bool stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega);
   LegConfig config_;
   std::optional<Time> last_;
   std::array<std::optional<Weights>, 2> weights_;  // of each standing foot
+  double sink_ = 0, sink_variance_ = 0;            // of the feet over the map's planes, as learned, m
   std::array<bool, 2> leave_ = {false, false};
   std::array<bool, 2> slid_ = {false, false};   // left because it moved
   std::array<std::optional<Time>, 2> refused_;  // since when
