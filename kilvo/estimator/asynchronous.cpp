@@ -119,7 +119,7 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   replay_.add(step);
   const std::array<bool, 2> passed = replay_.apply(*estimate_, step);
   stances_.judge(step, passed);
-  if ((step.foot[0].used && !passed[0]) || (step.foot[1].used && !passed[1])) ++statistics_.refused_stances;
+  if (!passed[0] && !passed[1]) ++statistics_.unsupported;
   keep_finite();
   // A sample of the IMU's own time belongs before the interval that begins there.
   if (s.t == anchor_.t) anchor_ = *estimate_;

@@ -104,9 +104,10 @@ std::vector<Output> Estimator::finish() {
 void Estimator::warn_of_unused_sensors() {
   constexpr std::uint64_t few = 20;  // messages
   const std::uint64_t legs = statistics_.sensors[static_cast<std::size_t>(Sensor::legs)].used;
-  if (statistics_.refused_stances > few && 10 * statistics_.refused_stances > legs) {
-    statistics_.warnings.push_back("legs: standing feet seemed to move in " + std::to_string(100 * statistics_.refused_stances / legs) +
-                                   " % of the messages and were left out: is the mount of the IMU right, and the URDF this robot's?");
+  // Even who runs has a foot on the ground for more than half of the time.
+  if (statistics_.unsupported > few && 2 * statistics_.unsupported > legs) {
+    statistics_.warnings.push_back("legs: no foot seemed to stand still in " + std::to_string(100 * statistics_.unsupported / legs) +
+                                   " % of the messages: is the mount of the IMU right, and the URDF this robot's?");
   }
   for (int i = 0; i < sensor_count; ++i) {
     const SensorCount& sensor = statistics_.sensors[static_cast<std::size_t>(i)];
