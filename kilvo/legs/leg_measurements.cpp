@@ -23,6 +23,29 @@ constexpr double sink_share = 0.15;
 constexpr double entry_time = 0.02;
 constexpr double shortest_step = 1e-4, longest_step = 0.05;  // s
 
+// How much each corner of a sole carries, which adds up to one, and the square of the least speed of a corner, m^2/s^2.
+struct CornerShare {
+  std::array<double, max_corners> weights{};
+  double least = std::numeric_limits<double>::infinity();
+};
+
+CornerShare share_of_corners(const FootPose& pose, const State& x, const Eigen::Vector3d& omega) {
+  CornerShare out;
+  std::array<double, max_corners> speed2{};
+  const auto corners = static_cast<std::size_t>(pose.corners);
+  for (std::size_t k = 0; k < corners; ++k) {
+    speed2[k] = velocity_W(x, pose.p[k], pose.v[k], omega).squaredNorm();
+    out.least = std::min(out.least, speed2[k]);
+  }
+  double sum = 0;
+  for (std::size_t k = 0; k < corners; ++k) {
+    out.weights[k] = std::exp((out.least - speed2[k]) / (2 * rolling_speed * rolling_speed));
+    sum += out.weights[k];
+  }
+  for (std::size_t k = 0; k < corners; ++k) out.weights[k] /= sum;
+  return out;
+}
+
 }  // namespace
 
 FootVelocityRow foot_velocity(const State& x, const SolePoint& point, const Eigen::Vector3d& gyro) {
@@ -208,12 +231,7 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
     foot.ends = std::exchange(leave_[side], false);
     foot.R_IF = pose.R_IF;
     const double phase = contacts.phase(side, feet.t);
-    std::array<double, max_corners> speed2{};
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < static_cast<std::size_t>(pose.corners); ++k) {
-      speed2[k] = velocity_W(x, pose.p[k], pose.v[k], omega).squaredNorm();
-      least = std::min(least, speed2[k]);
-    }
+    const auto [weights, least] = share_of_corners(pose, x, omega);
     const bool stands = contacts.contacts().on[side] && phase >= config_.entry_delay;
     if (stuck(side, feet, omega) || !stands || !may_stand(side, least, sigma_v)) {
       foot.ends = foot.ends || weights_[side].has_value();
@@ -221,16 +239,9 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
       slid_[side] = slid_[side] && stands;
       continue;
     }
-    Weights weights{};
-    double sum = 0;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(pose.corners); ++k) {
-      weights[k] = std::exp((least - speed2[k]) / (2 * rolling_speed * rolling_speed));
-      sum += weights[k];
-    }
     foot.begins = !weights_[side].has_value();
     foot.used = true;
     for (std::size_t k = 0; k < static_cast<std::size_t>(pose.corners); ++k) {
-      weights[k] /= sum;
       foot.point.p += weights[k] * pose.p[k];
       foot.point.v += weights[k] * pose.v[k];
       if (!foot.begins) foot.shift += (weights[k] - (*weights_[side])[k]) * pose.p[k];
