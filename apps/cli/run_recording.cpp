@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <fmt/core.h>
+#include <utility>
 
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/interrupt.hpp"
@@ -59,7 +60,8 @@ Estimator make_estimator(const lab::Settings& settings, const std::vector<Sensor
   try {
     return {settings.robot, settings.estimator, as_flags(used)};
   } catch (const std::invalid_argument& error) {
-    throw lab::ConfigError(error.what());
+    const std::string why = error.what();
+    throw lab::ConfigError(why.starts_with("robot.urdf") ? fmt::format("{}: {}", settings.urdf_file, why) : why);
   }
 }
 
@@ -102,6 +104,7 @@ class Run {
         failing_, [this] { return source_.progress(); }, options_.threads > 1);
     bool interrupted = false;
     while (auto measurement = input.next()) {
+      require_legs(*measurement);
       keep(estimator_.push(*std::move(measurement)));
       progress_.update(input.progress(), [this] { return progress_note(); });
       interrupted = interrupt_.requested();
@@ -110,6 +113,13 @@ class Run {
     input.stop();
     keep(estimator_.finish());
     return interrupted;
+  }
+
+  // The first message of the legs shows whether it is of the robot in the configuration.
+  void require_legs(const Measurement& m) {
+    const auto* joints = std::get_if<JointSample>(&m);
+    if (joints == nullptr || joints->position.empty() || std::exchange(legs_seen_, true)) return;
+    if (const auto why = estimator_.mismatch(*joints)) throw lab::ConfigError(fmt::format("{}: {}", facts_.config_file, *why));
   }
 
   void keep(std::vector<Output> outputs) {
@@ -161,6 +171,7 @@ class Run {
   MapKeeper map_;
   ResultFiles files_;
   Progress progress_;
+  bool legs_seen_ = false;
 };
 
 }  // namespace

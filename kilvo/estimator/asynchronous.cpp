@@ -1,6 +1,7 @@
 // The asynchronous phase: IMU and legs.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/estimator/stopwatch.hpp"
@@ -52,8 +53,10 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
     process_pending(s.t, out);
     closed_ = *estimate_;
   }
+  Stopwatch watch;
   replay_.advance(closed_, s.t, trajectory_);
   estimate_ = closed_;
+  closing_us_ = last_legs_ ? closing_us_ + watch.lap_us() : 0;
   keep_finite();
   if (s.t - anchor_.t > longest_replay && pending_.empty()) settle(closed_);
   choose_modality(s.t);
@@ -79,9 +82,9 @@ void Estimator::lose_legs(Time t) {
 
 // On the legs alone a wrong velocity makes standing feet look as if they moved, so that they are not used, and nothing mends it. No flight
 // lasts this long: the velocity is taken as unknown, and the feet as standing.
-void Estimator::keep_a_foothold(const LegStep& step) {
+void Estimator::keep_a_foothold(const LegStep& step, const std::array<bool, 2>& passed) {
   constexpr Duration longest_flight = std::chrono::milliseconds(500);
-  if (step.foot[0].used || step.foot[1].used || modality_ != Modality::ki) last_stance_ = step.t;
+  if (passed[0] || passed[1] || modality_ != Modality::ki) last_stance_ = step.t;
   if (step.t - last_stance_ < longest_flight) return;
   constexpr double unknown_velocity = 1.0;  // m/s
   for (Estimate* e : {&*estimate_, &closed_}) e->P.diagonal().segment<3>(at::v).array() += unknown_velocity * unknown_velocity;
@@ -108,11 +111,15 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   const Eigen::Vector3d omega = replay_.newest_imu().gyro - x.bg;
   const double before_us = watch.lap_us();
   const double sigma_v = std::sqrt(std::max(0.0, estimate_->P.block<3, 3>(at::v, at::v).trace() / 3));
-  const Contacts& contacts = contacts_.update(feet, x, omega, replay_.newest_imu().accel - x.ba, sigma_v);
+  const Contacts& contacts = contacts_.update(feet, x, omega, replay_.newest_imu().accel - x.ba, sigma_v, &map_);
   const double contact_us = watch.lap_us();
-  const LegStep step = stances_.step(feet, contacts_, x, omega, sigma_v);
+  // Beside a LiDAR the ground under a foot tells nothing new of the height, but how the feet stand on it.
+  const auto ground = modality_ == Modality::ki ? StanceTracker::Ground::use : StanceTracker::Ground::learn;
+  const LegStep step = stances_.step(feet, contacts_, x, omega, sigma_v, &map_, ground);
   replay_.add(step);
-  replay_.apply(*estimate_, step);
+  const std::array<bool, 2> passed = replay_.apply(*estimate_, step);
+  stances_.judge(step, passed);
+  if (!passed[0] && !passed[1]) ++statistics_.unsupported;
   keep_finite();
   // A sample of the IMU's own time belongs before the interval that begins there.
   if (s.t == anchor_.t) anchor_ = *estimate_;
@@ -120,8 +127,8 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   const double after_us = watch.lap_us();
 
   choose_modality(s.t);
-  keep_a_foothold(step);
-  emit(out, contacts, before_us + contact_us + after_us, contact_us);
+  keep_a_foothold(step, passed);
+  emit(out, contacts, before_us + contact_us + after_us + std::exchange(closing_us_, 0), contact_us);
 }
 
 }  // namespace kilvo

@@ -60,22 +60,17 @@ void Estimator::give_map(VoxelMap map) {
 
 std::vector<Output> Estimator::push(Measurement m) {
   std::vector<Output> out;
+  push(std::move(m), out);
+  return out;
+}
+
+void Estimator::push(Measurement m, std::vector<Output>& out) {
   const Sensor s = sensor_of(m);
-  if (!used_[static_cast<std::size_t>(s)]) {
-    drop(s, "not used");
-    return out;
-  }
-  if (const char* fault = fault_of(m)) {
-    drop(s, fault);
-    return out;
-  }
-  if (const auto refused = timeline_.push(std::move(m))) {
-    drop(s, *refused);
-    return out;
-  }
+  if (!used_[static_cast<std::size_t>(s)]) return drop(s, "not used");
+  if (const char* fault = fault_of(m)) return drop(s, fault);
+  if (const auto refused = timeline_.push(std::move(m))) return drop(s, *refused);
   for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, "time jump");
   while (auto next = timeline_.pop()) handle(*next, out);
-  return out;
 }
 
 std::vector<Output> Estimator::finish() {
@@ -108,6 +103,12 @@ std::vector<Output> Estimator::finish() {
 // A sensor that was there and of little use is what the user must know of first.
 void Estimator::warn_of_unused_sensors() {
   constexpr std::uint64_t few = 20;  // messages
+  const std::uint64_t legs = statistics_.sensors[static_cast<std::size_t>(Sensor::legs)].used;
+  // Even who runs has a foot on the ground for more than half of the time.
+  if (statistics_.unsupported > few && 2 * statistics_.unsupported > legs) {
+    statistics_.warnings.push_back("legs: no foot seemed to stand still in " + std::to_string(100 * statistics_.unsupported / legs) +
+                                   " % of the messages: is the mount of the IMU right, and the URDF this robot's?");
+  }
   for (int i = 0; i < sensor_count; ++i) {
     const SensorCount& sensor = statistics_.sensors[static_cast<std::size_t>(i)];
     const auto weight = [](const auto& cause) { return cause.first == "before the start" || cause.first == "not used" ? 0 : cause.second; };

@@ -34,9 +34,14 @@ class Estimator {
 
   /// Takes a measurement in the order of its arrival; returns what became known, in time order.
   std::vector<Output> push(Measurement m);
+  /// The same, appended to `out`: a caller that uses one vector again and again spares the leg path its only allocation.
+  void push(Measurement m, std::vector<Output>& out);
 
   /// No more measurements will come: what still waits is processed.
   std::vector<Output> finish();
+
+  /// Why leg messages like this one cannot be used with this robot, if so: the first of them decides whether a run makes sense.
+  std::optional<std::string> mismatch(const JointSample& s) const { return kinematics_ ? kinematics_->mismatch(s) : std::nullopt; }
 
   const Statistics& statistics() const { return statistics_; }
   const VoxelMap& map() const { return map_; }
@@ -61,7 +66,7 @@ class Estimator {
   void handle_imu(ImuSample s, std::vector<Output>& out);
   void handle_legs(const JointSample& s, std::vector<Output>& out);
   void lose_legs(Time t);
-  void keep_a_foothold(const LegStep& step);
+  void keep_a_foothold(const LegStep& step, const std::array<bool, 2>& passed);
   void choose_modality(Time t);
 
   // sequential.cpp: sweeps
@@ -117,6 +122,7 @@ class Estimator {
   StanceTracker stances_;
   std::optional<Time> last_legs_;   // while the legs are used
   double leg_period_ = 0;           // between the last two leg samples, s
+  double closing_us_ = 0;           // what it took to close the IMU's intervals since the last leg sample
   Time last_stance_{};              // when a foot was used last
   Time last_sweep_{};               // end of the last sweep, or the start
   Time last_middle_{};              // of the last sweep

@@ -23,8 +23,8 @@ bool is_new_view(const Track& track) {
   return octaves > new_scale || track.view_angle > new_angle;
 }
 
-// What an image says of the pose goes into what it leaves behind only where the LiDAR is blind. Elsewhere its patches are kept where the LiDAR's
-// map has them: else two maps would come to be, each true to itself, whose rays and planes no longer meet where the surface is.
+// What an image says of the pose goes into what it leaves behind only where the LiDAR is blind. Elsewhere its patches are kept where the
+// LiDAR's map has them: else two maps would come to be, each true to itself, whose rays and planes no longer meet where the surface is.
 SE3 as_the_map_has_it(const State& before, const State& after, const PoseCovariance& weak) {
   const Eigen::Matrix<double, 6, 1> change = weak * boxminus(after, before).head<6>();
   return {before.R * SO3::Exp(change.head<3>()), before.p + change.tail<3>()};

@@ -222,6 +222,28 @@ TEST(Legs, FrozenEncodersOfOneFootAreOutlivedWithoutLidar) {
   EXPECT_LT(r.worst_position, 0.3) << "1.5 s; the body moves at 0.6 m/s";
 }
 
+TEST(Legs, OfAnotherMountAreSaidAndDoNotSpoilWhatTheLidarSees) {
+  const SO3 wrong = SO3::Exp({0, 0, 0.8});
+  auto config = swaying();
+  config.duration = 6;
+  const Drive r = drive(config, all_three, [&](Measurement& m, double) {
+    auto* legs = std::get_if<JointSample>(&m);
+    for (std::size_t k = 0; legs != nullptr && k < 6; k += 3) {
+      const Eigen::Vector3d p = wrong * Eigen::Vector3d(legs->position[k], legs->position[k + 1], legs->position[k + 2]);
+      const Eigen::Vector3d v = wrong * Eigen::Vector3d(legs->velocity[k], legs->velocity[k + 1], legs->velocity[k + 2]);
+      for (std::size_t i = 0; i < 3; ++i) {
+        legs->position[k + i] = p[static_cast<Eigen::Index>(i)];
+        legs->velocity[k + i] = v[static_cast<Eigen::Index>(i)];
+      }
+    }
+    return true;
+  });
+  expect_sane(r);
+  EXPECT_LT(r.worst_position, 0.05);
+  EXPECT_GT(r.statistics.unsupported, used(r, Sensor::legs) / 2);
+  EXPECT_TRUE(std::ranges::any_of(r.statistics.warnings, [](const std::string& w) { return w.find("mount") != std::string::npos; }));
+}
+
 TEST(Legs, ThatNeverSpeakAreLostAfter50Milliseconds) {
   auto config = swaying();
   config.duration = 3;

@@ -54,6 +54,7 @@ struct Statistics {
   std::array<SensorCount, sensor_count> sensors;  // by Sensor
   PointDrops points;                              // LiDAR points not used, by cause
   std::uint64_t lost_stances = 0;                 // on the legs alone no foot was found for so long that the velocity was given up
+  std::uint64_t unsupported = 0;                  // leg samples in which no foot stood, or stood still enough to be used
   std::uint64_t rollbacks = 0;                    // a non-finite state was thrown away
   bool diverged = false;
   std::vector<std::string> warnings;  // each said once

@@ -79,7 +79,7 @@ std::optional<Eigen::Vector3d> Replay::gyro_at(Time t) const {
   return a.gyro + (to_seconds(t - a.t) / to_seconds(next->t - a.t)) * (next->gyro - a.gyro);
 }
 
-int Replay::apply(Estimate& e, const LegStep& step) const {
+std::array<bool, 2> Replay::apply(Estimate& e, const LegStep& step) const {
   bool any = false;
   for (std::size_t side = 0; side < 2; ++side) {
     const Stance& foot = step.foot[side];
@@ -88,16 +88,16 @@ int Replay::apply(Estimate& e, const LegStep& step) const {
     if (foot.used && !foot.begins) move_stance(e, side, foot.shift);
     any = any || foot.used;
   }
-  if (!any || imu_.empty()) return 0;
+  if (!any || imu_.empty()) return {};
   // Without a rate the velocity of a foot that is a leg away from the IMU is anything.
   const auto gyro = gyro_at(step.t);
-  if (!gyro) return 0;
+  if (!gyro) return {step.foot[0].used, step.foot[1].used};
   LegModel model(step, *gyro, config_.legs);
   // The rows are nearly linear: one iteration.
   UpdateConfig once;
   once.max_iterations = 1;
   e = update(e, model, once).posterior;
-  return static_cast<int>(model.passed()[0]) + static_cast<int>(model.passed()[1]);
+  return model.passed();
 }
 
 void Replay::advance(Estimate& e, Time until, Trajectory& record) const {

@@ -2,10 +2,10 @@
 // or again after a sweep has corrected its beginning.
 #pragma once
 
-#include <deque>
 #include <optional>
 
 #include "kilvo/estimator/config.hpp"
+#include "kilvo/estimator/recent.hpp"
 #include "kilvo/filter/trajectory.hpp"
 #include "kilvo/legs/leg_measurements.hpp"
 
@@ -29,8 +29,8 @@ class Replay {
   /// Predicts e to `until` without looking at the legs.
   void predict_to(Estimate& e, Time until, Trajectory* record) const;
 
-  /// Applies one leg step to e, which must be of its time. Returns how many feet of it were used.
-  int apply(Estimate& e, const LegStep& step) const;
+  /// Applies one leg step to e, which must be of its time. Returns which feet of it were used and not refused.
+  std::array<bool, 2> apply(Estimate& e, const LegStep& step) const;
 
   /// What is not needed by estimates of `t` and later.
   void forget_before(Time t);
@@ -42,8 +42,8 @@ class Replay {
   FootOrientations standing_at(Time t) const;
 
   EstimatorConfig config_;
-  std::deque<ImuSample> imu_;
-  std::deque<LegStep> steps_;
+  Recent<ImuSample> imu_;
+  Recent<LegStep> steps_;
   // Of the last seconds of the IMU.
   Eigen::Vector3d gyro_mean_ = Eigen::Vector3d::Zero(), accel_mean_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d gyro_variance_ = Eigen::Vector3d::Zero(), accel_variance_ = Eigen::Vector3d::Zero();

@@ -56,7 +56,15 @@ std::optional<std::string> Timeline::admit(Measurement m, Time key) {
     stamp_[s] = stamp;
   }
   newest_of_all_ = std::max(newest_of_all_.value_or(key), key);
-  waiting_.emplace(std::tuple(key, sensor_of(m), sequence_++), std::move(m));
+  const auto place = std::tuple(key, sensor_of(m), sequence_++);
+  if (spare_.empty()) {
+    waiting_.emplace(place, std::move(m));
+  } else {
+    spare_.back().key() = place;
+    spare_.back().mapped() = std::move(m);
+    waiting_.insert(std::move(spare_.back()));
+    spare_.pop_back();
+  }
   return std::nullopt;
 }
 
@@ -78,7 +86,10 @@ std::optional<Measurement> Timeline::pop() {
   if (waiting_.empty() || !may_go(std::get<Time>(waiting_.begin()->first))) return std::nullopt;
   auto first = waiting_.extract(waiting_.begin());
   released_ = std::get<Time>(first.key());
-  return std::move(first.mapped());
+  std::optional<Measurement> out = std::move(first.mapped());
+  constexpr std::size_t most_spare = 64;
+  if (spare_.size() < most_spare) spare_.push_back(std::move(first));
+  return out;
 }
 
 }  // namespace kilvo

@@ -48,8 +48,10 @@ class Timeline {
   std::array<std::optional<Time>, sensor_count> stamp_;  // of the newest
   std::optional<Time> released_, newest_of_all_;
   // By completion; of the same time the IMU first; then by arrival.
-  std::map<std::tuple<Time, Sensor, std::uint64_t>, Measurement> waiting_;
-  std::vector<Measurement> suspects_;  // ahead of all others
+  using Queue = std::map<std::tuple<Time, Sensor, std::uint64_t>, Measurement>;
+  Queue waiting_;
+  std::vector<Queue::node_type> spare_;  // nodes of what has gone, to be used again: nothing is allocated at the rate of the legs
+  std::vector<Measurement> suspects_;    // ahead of all others
   std::vector<Sensor> jumped_;
   std::uint64_t sequence_ = 0;
   Duration max_wait_;

@@ -51,7 +51,8 @@ ForceJacobians jacobians_of(const State& x, const Motion& m) {
   return j;
 }
 
-void add_process_noise(Covariance& P, const Motion& m, const FootOrientations& feet, const ProcessNoise& n, const ImuInterval& interval) {
+void add_process_noise(Covariance& P, const Motion& m, const Eigen::Vector3d& up_W, const FootOrientations& feet, const ProcessNoise& n,
+                       const ImuInterval& interval) {
   const double dt = m.dt;
   const auto add = [&P](int row, int col, double value) { P.diagonal(col - row).segment<3>(std::min(row, col)).array() += value; };
   const double accel = interval.accel_scale * n.accel * n.accel;
@@ -63,8 +64,11 @@ void add_process_noise(Covariance& P, const Motion& m, const FootOrientations& f
   add(at::bg, at::bg, n.gyro_bias * n.gyro_bias * dt);
   add(at::ba, at::ba, n.accel_bias * n.accel_bias * dt);
   for (int foot = 0; foot < 2; ++foot) {
-    // Isotropic for now in the foot's own axes, so its orientation drops out; a foot that does not stand gets none.
-    if (feet[static_cast<std::size_t>(foot)]) add(at::pcl + 3 * foot, at::pcl + 3 * foot, n.foot * n.foot * dt);
+    // A foot that does not stand gets none. Round the vertical it is isotropic, so the foot's orientation drops out.
+    if (!feet[static_cast<std::size_t>(foot)]) continue;
+    const int pc = at::pcl + 3 * foot;
+    add(pc, pc, n.foot * n.foot * dt);
+    P.block<3, 3>(pc, pc) += (n.foot_vertical * n.foot_vertical - n.foot * n.foot) * dt * up_W * up_W.transpose();
   }
   P(at::tau, at::tau) += n.exposure * n.exposure * dt;
 }
@@ -126,7 +130,7 @@ Estimate predict(const Estimate& e, const ImuInterval& interval, const FootOrien
   out.P.topRightCorner<9, at::size - 9>() = M.rightCols<at::size - 9>();
   out.P.bottomLeftCorner<at::size - 9, 9>() = M.rightCols<at::size - 9>().transpose();
   out.P.topLeftCorner<9, 9>() = 0.5 * (N + N.transpose());
-  add_process_noise(out.P, m, feet, noise, interval);
+  add_process_noise(out.P, m, -e.x.g.normalized(), feet, noise, interval);
   return out;
 }
 

@@ -27,13 +27,14 @@ struct ImuInterval {
 /// Densities of the process noise: what is added to the covariance is the square times dt, so that one setting means one filter at
 /// any rate.
 struct ProcessNoise {
-  double gyro = 4e-4;        // rad/s/sqrt(Hz)
-  double accel = 0.003;      // m/s^2/sqrt(Hz)
-  double velocity = 8e-4;    // m/s/sqrt(Hz)
-  double gyro_bias = 2e-5;   // rad/s/sqrt(s)
-  double accel_bias = 3e-4;  // m/s^2/sqrt(s)
-  double foot = 0.01;        // m/sqrt(s), of a standing foot, each axis of the foot frame
-  double exposure = 0.05;    // 1/sqrt(s)
+  double gyro = 4e-4;            // rad/s/sqrt(Hz)
+  double accel = 0.003;          // m/s^2/sqrt(Hz)
+  double velocity = 8e-4;        // m/s/sqrt(Hz)
+  double gyro_bias = 2e-5;       // rad/s/sqrt(s)
+  double accel_bias = 3e-4;      // m/s^2/sqrt(s)
+  double foot = 0.01;            // m/sqrt(s), of a standing foot, each axis of the foot frame
+  double exposure = 0.05;        // 1/sqrt(s)
+  double foot_vertical = 0.025;  // m/sqrt(s), of a standing foot against gravity
 
   static constexpr auto fields() {
     return std::tuple{
@@ -44,6 +45,7 @@ struct ProcessNoise {
         Field{"gyro_bias_walk", &ProcessNoise::gyro_bias, "rad/s/sqrt(s)", "random walk of the gyro bias"},
         Field{"accel_bias_walk", &ProcessNoise::accel_bias, "m/s^2/sqrt(s)", "random walk of the accelerometer bias"},
         Field{"foot_noise", &ProcessNoise::foot, "m/sqrt(s)", "random walk of a standing foot"},
+        Field{"foot_noise_vertical", &ProcessNoise::foot_vertical, "m/sqrt(s)", "the same along the vertical"},
         Field{"exposure_walk", &ProcessNoise::exposure, "1/sqrt(s)", "random walk of the relative inverse exposure"}};
   }
 };

@@ -187,7 +187,7 @@ TEST(Predict, NoiseDensitiesMeanWhatTheirUnitsSay) {
   EXPECT_NEAR(sigma(at::ba), n.accel_bias, 1e-6 * n.accel_bias);
   EXPECT_NEAR(sigma(at::tau), n.exposure, 1e-6 * n.exposure);
   EXPECT_NEAR(sigma(at::pcl), n.foot, 1e-6 * n.foot);
-  EXPECT_NEAR(sigma(at::pcr + 2), n.foot, 1e-6 * n.foot);
+  EXPECT_NEAR(sigma(at::pcr + 2), n.foot_vertical, 1e-6 * n.foot_vertical);
   EXPECT_EQ(P(at::g, at::g), 0);
   // After 1 s, gyro^2 + gyro_bias^2 / 3.
   EXPECT_NEAR(sigma(at::R), std::sqrt(n.gyro * n.gyro + n.gyro_bias * n.gyro_bias / 3), 1e-3 * n.gyro);

@@ -51,7 +51,8 @@ FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d
   const Eigen::Vector3d v_W = velocity_W(x, low.p, low.v, omega);
   out.speed = v_W.norm();
   out.vertical = up_W.dot(v_W);
-  out.height = up_W.dot(x.pose() * low.p);
+  out.lowest = x.pose() * low.p;
+  out.height = up_W.dot(out.lowest);
   return out;
 }
 
@@ -62,10 +63,11 @@ void ContactEstimator::start(const Feet& feet, const State& x, const std::array<
     FootState& f = foot_[side];
     f = {};
     f.since = feet.t - milliseconds(1000);
-    f.ground_z = motion[side].height;
+    f.ground = {-x.g.normalized(), motion[side].lowest, 0};
     // The foot that is clearly higher than the other is in the air, or will show that it is not.
     contacts_.on[side] = motion[side].height - motion[1 - side].height < standing_level * leg;
   }
+  ground_.forget();
   started_ = true;
 }
 
@@ -112,6 +114,15 @@ void ContactEstimator::learn(double peak, Duration swing) {
   if (slow_swings_ == 0 || walks_so) swing_speed_ += swing_gain * (peak - swing_speed_);
 }
 
+// The ground is looked up at touchdown; through the point on which the foot stands, so that standing has no clearance.
+void ContactEstimator::stand(FootState& f, const FootMotion& m, const State& x, bool arrives, const VoxelMap* map) {
+  if (arrives) {
+    ground_.stands_at(m.lowest);
+    if (const auto patch = ground_.under(map, m.lowest, -x.g.normalized())) f.ground.normal = patch->normal;
+  }
+  f.ground.point = m.lowest;
+}
+
 // Deviation of the acceleration from its usual values of the last seconds, in their standard deviations.
 void ContactEstimator::deviate(const Eigen::Vector3d& accel, double dt) {
   constexpr double least_variance = 1e-4;  // (m/s^2)^2
@@ -124,7 +135,7 @@ void ContactEstimator::deviate(const Eigen::Vector3d& accel, double dt) {
 }
 
 const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel,
-                                         double sigma_v) {
+                                         double sigma_v, const VoxelMap* map) {
   const std::array<FootMotion, 2> motion = {motion_of(feet.foot[0], x, omega, sigma_v), motion_of(feet.foot[1], x, omega, sigma_v)};
   if (!started_) {
     contacts_.t = feet.t;
@@ -139,6 +150,7 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
     // One wild sample is no peak.
     if (f.count > 0) f.peak = std::max(f.peak, std::min(m.speed, f.samples[(f.count - 1) % history].speed));
     f.samples[f.count++ % history] = {feet.t, m.speed, m.vertical};
+    const bool stood = contacts_.on[side];
     if (contacts_.on[side] && lifts(f, m, feet.t)) {
       contacts_.on[side] = false;
       f.since = feet.t;
@@ -151,8 +163,8 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
       f.impact.reset();
       f.slow.reset();
     }
-    if (contacts_.on[side]) f.ground_z = m.height;
-    contacts_.clearance[side] = m.height - f.ground_z;
+    if (contacts_.on[side]) stand(f, m, x, !stood, map);
+    contacts_.clearance[side] = f.ground.height_of(m.lowest);
     contacts_.d_fv[side] = detection_threshold * m.slowest / (config_.lift_off_speed * swing_speed_);
   }
   return contacts_;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "kilvo/filter/state.hpp"
+#include "kilvo/legs/ground.hpp"
 #include "kilvo/legs/leg_config.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
 
@@ -16,7 +17,7 @@ namespace kilvo {
 struct Contacts {
   Time t{};
   std::array<bool, 2> on = {true, true};
-  std::array<double, 2> clearance = {0, 0};  // of the lowest point over where it stood last, m
+  std::array<double, 2> clearance = {0, 0};  // of the lowest point over the ground on which it stood last, m
   double d_a = 0;                            // normalised deviation of the acceleration
   std::array<double, 2> d_fv = {0, 0};       // normalised deviation of the foot's velocity; above 10: it moves
 };
@@ -28,10 +29,11 @@ inline Eigen::Vector3d velocity_W(const State& x, const Eigen::Vector3d& p_I, co
 
 /// A sole's slowest corner and its lowest point, in the world.
 struct FootMotion {
-  double slowest = 0;   // speed of the slowest corner, m/s
-  double speed = 0;     // of the lowest point, m/s
-  double vertical = 0;  // its upward velocity, m/s
-  double height = 0;    // of the lowest point, against gravity, m
+  double slowest = 0;                                // speed of the slowest corner, m/s
+  double speed = 0;                                  // of the lowest point, m/s
+  double vertical = 0;                               // its upward velocity, m/s
+  double height = 0;                                 // of the lowest point, against gravity, m
+  Eigen::Vector3d lowest = Eigen::Vector3d::Zero();  // the lowest point, m
 };
 /// `sigma_v`: uncertainty of the state's velocity, m/s; what of a corner's speed it may explain is taken off.
 FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0);
@@ -40,8 +42,10 @@ class ContactEstimator {
  public:
   explicit ContactEstimator(const LegConfig& config) : config_(config) {}
 
-  /// `x`: the state at feet.t. `omega`, `accel`: bias-free rate (rad/s) and specific force (m/s^2) of the IMU.
-  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel, double sigma_v = 0);
+  /// `x`: the state at feet.t. `omega`, `accel`: bias-free rate (rad/s) and specific force (m/s^2) of the IMU. `map`: where the ground is
+  /// looked up, if there is one.
+  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel, double sigma_v = 0,
+                         const VoxelMap* map = nullptr);
 
   const Contacts& contacts() const { return contacts_; }
   /// The largest speed of a foot in its last swings, m/s; what all speeds are compared with.
@@ -64,12 +68,13 @@ class ContactEstimator {
     Time since{};                              // of the present phase
     double peak = 0;                           // speed in this swing, held for two samples
     std::optional<Time> moving, impact, slow;  // since when the cue has been there
-    double ground_z = 0;                       // height of the last place it stood on
+    GroundPatch ground;                        // of the last place it stood on
   };
   void start(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion);
   bool lifts(FootState& f, const FootMotion& m, Time t) const;
   bool lands(FootState& f, const FootMotion& m, Time t) const;
   bool held(std::optional<Time>& since, bool cue, Time t, Duration at_least) const;
+  void stand(FootState& f, const FootMotion& m, const State& x, bool arrives, const VoxelMap* map);
   void learn(double peak, Duration swing);
   void deviate(const Eigen::Vector3d& accel, double dt);
 
@@ -79,6 +84,7 @@ class ContactEstimator {
   double swing_speed_ = 0, first_guess_ = 0;  // m/s
   int slow_swings_ = 0;                       // in a row
   Duration period_{};
+  GroundLookup ground_;
   std::array<FootState, 2> foot_;
   Eigen::Vector3d accel_mean_ = Eigen::Vector3d::Zero(), accel_variance_ = Eigen::Vector3d::Zero();
 };

@@ -8,15 +8,17 @@
 namespace kilvo {
 
 struct LegConfig {
-  double lift_off_speed = 0.1;        // share of the robot's swing speed
-  double touchdown_speed = 0.06;      // share of the robot's swing speed
-  double impact_drop = 0.62;          // share of the speed before
-  double settling = 0.1;              // s
-  double velocity_sigma = 0.01;       // m/s
-  double velocity_correlation = 0.2;  // s
-  double position_sigma = 0.001;      // m
-  double position_correlation = 0.5;  // s
-  double entry_delay = 0.015;         // s
+  double lift_off_speed = 0.1;             // share of the robot's swing speed
+  double touchdown_speed = 0.06;           // share of the robot's swing speed
+  double impact_drop = 0.62;               // share of the speed before
+  double settling = 0.1;                   // s
+  double velocity_sigma = 0.01;            // m/s
+  double vertical_velocity_sigma = 0.025;  // m/s
+  double velocity_correlation = 0.2;       // s
+  double position_sigma = 0.001;           // m
+  double position_correlation = 0.5;       // s
+  double ground_sigma = 0.02;              // m
+  double entry_delay = 0.015;              // s
   double gate = 5.0;
 
   static constexpr auto fields() {
@@ -29,9 +31,13 @@ struct LegConfig {
               "a descending foot whose speed falls below this share of its largest within 20 ms has reached the ground"},
         Field{"settling", &LegConfig::settling, "s", "after touchdown a foot needs seven times the speed to be called lifted, for so long"},
         Field{"velocity_sigma", &LegConfig::velocity_sigma, "m/s", "standard deviation of the velocity of a standing foot"},
+        Field{"vertical_velocity_sigma", &LegConfig::vertical_velocity_sigma, "m/s",
+              "the same along the vertical, where soles settle and roll alike at every step"},
         Field{"velocity_correlation", &LegConfig::velocity_correlation, "s", "correlation time of that: rows closer together share it"},
         Field{"position_sigma", &LegConfig::position_sigma, "m", "standard deviation of the position of a standing foot"},
         Field{"position_correlation", &LegConfig::position_correlation, "s", "correlation time of that"},
+        Field{"ground_sigma", &LegConfig::ground_sigma, "m",
+              "standard deviation of a foot's height over the map's ground at touchdown, without LiDAR"},
         Field{"entry_delay", &LegConfig::entry_delay, "s", "a foot is used this long after its touchdown"},
         Field{"gate", &LegConfig::gate, "sigma", "a standing foot that moves more than this is not used"}};
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <console_bridge/console.h>
 #include <kdl/chainfksolvervel_recursive.hpp>
 #include <kdl/tree.hpp>
 #include <limits>
@@ -49,13 +50,32 @@ void add_children(const urdf::Link& link, const Robot& robot, KDL::Tree& tree) {
   }
 }
 
+// Keeps what the parser has to say, instead of letting it print, as long as this lives.
+class ParserWords final : public console_bridge::OutputHandler {
+ public:
+  ParserWords() { console_bridge::useOutputHandler(this); }
+  ~ParserWords() override { console_bridge::restorePreviousOutputHandler(); }
+  ParserWords(const ParserWords&) = delete;
+  ParserWords& operator=(const ParserWords&) = delete;
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (first_.empty() && level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) first_ = ": " + text;
+  }
+  const std::string& first() const { return first_; }
+
+ private:
+  std::string first_;
+};
+
 KDL::Tree tree_of(const Robot& robot) {
+  const ParserWords words;
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(robot.urdf);
-  if (!model || !model->getRoot()) throw std::invalid_argument("robot.urdf is not a URDF document");
+  if (!model || !model->getRoot()) throw std::invalid_argument("robot.urdf is not a URDF document" + words.first());
   KDL::Tree tree(model->getRoot()->name);
   add_children(*model->getRoot(), robot, tree);
   return tree;
 }
+
+std::string missing(const std::string& joint) { return "joint " + joint + " is neither in the message nor in robot.locked_joints"; }
 
 // One leg: the solver with its input, and where in the message each joint is.
 struct Leg {
@@ -107,7 +127,7 @@ std::optional<std::string> LegKinematics::Chains::find_places(const std::vector<
       const auto it = std::ranges::find(names, joint);
       if (it == names.end()) {
         message_names.clear();
-        return "joint " + joint + " is neither in the message nor in robot.locked_joints";
+        return missing(joint);
       }
       leg.places.push_back(static_cast<std::size_t>(it - names.begin()));
     }
@@ -196,7 +216,7 @@ std::variant<Feet, std::string> LegKinematics::feet(const JointSample& s) {
   if (c.by_joints) {
     if (s.names.size() != s.position.size()) return "as many names as positions are needed";
     if (auto missing = c.find_places(s.names)) return std::move(*missing);
-  } else if (s.position.size() < 6) {
+  } else if (s.position.size() != 6) {
     return "two feet need six positions";
   }
   const std::vector<double>* velocity = c.velocity_of(s);
@@ -211,6 +231,20 @@ std::variant<Feet, std::string> LegKinematics::feet(const JointSample& s) {
     }
   }
   return out;
+}
+
+std::optional<std::string> LegKinematics::mismatch(const JointSample& s) const {
+  const Chains& c = *chains_;
+  if (!c.by_joints) {
+    if (s.position.size() == 6) return std::nullopt;
+    return "legs.type: feet needs messages of six positions, two feet; these have " + std::to_string(s.position.size());
+  }
+  for (const Leg& leg : c.legs) {
+    for (const std::string& joint : leg.names) {
+      if (std::ranges::find(s.names, joint) == s.names.end()) return missing(joint);
+    }
+  }
+  return std::nullopt;
 }
 
 SolePoint lowest_point(const FootPose& foot, const Eigen::Vector3d& up_I) {

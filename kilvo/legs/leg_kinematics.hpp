@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 
@@ -50,6 +51,10 @@ class LegKinematics {
   /// without velocities gets the difference to the message before, so the first of them only begins it. Allocates only when the names in
   /// the message change.
   std::variant<Feet, std::string> feet(const JointSample& sample);
+
+  /// What makes messages like this one useless for this robot, if anything: a joint that is neither in them nor locked, joints where two
+  /// feet are expected.
+  std::optional<std::string> mismatch(const JointSample& sample) const;
 
  private:
   struct Chains;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 
 #include "kilvo/filter/measurement_rows.hpp"
@@ -20,6 +21,7 @@ struct Stance {
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();  // from where the point was in the sole before to where it is now; IMU frame, m
   double looseness = 1;                             // factor on the variance of its rows (Eq. 8)
   SO3 R_IF;
+  std::optional<GroundPatch> ground;  // on which it has just come down: its height counts once
 };
 
 /// One leg sample, ready for the filter: it can be applied again when the state before it has been corrected.
@@ -44,17 +46,31 @@ struct FootPositionRow {
 };
 FootPositionRow foot_position(const State& x, const SolePoint& point, const Eigen::Vector3d& pc);
 
-/// The model that `update` calls: velocity and position of each standing foot that passes the gate.
+/// r = n'(p_c - q), the height of the contact point over the ground (Eq. 6); J over p_c.
+struct FootHeightRow {
+  double r;
+  Eigen::RowVector3d J_pc;
+};
+FootHeightRow foot_height(const GroundPatch& ground, const Eigen::Vector3d& pc);
+
+/// The model that `update` calls: velocity and position of each standing foot that passes the gate, and at touchdown its height.
 class LegModel {
  public:
+  static constexpr int max_leg_rows = 14;
+
   LegModel(const LegStep& step, const Eigen::Vector3d& gyro, const LegConfig& config) : step_(step), gyro_(gyro), config_(config) {}
 
-  Rows<12> operator()(const State& x, const Covariance& prior);
+  Rows<max_leg_rows> operator()(const State& x, const Covariance& prior);
 
   /// Of the last evaluation: which feet passed.
   const std::array<bool, 2>& passed() const { return passed_; }
 
  private:
+  using LegRows = Rows<max_leg_rows>;
+  bool moves(const Covariance& prior, std::size_t side, const Eigen::Vector3d& velocity, const Eigen::Vector3d& offset) const;
+  bool add_motion(LegRows& rows, int count, std::size_t side, const State& x, const Covariance& prior) const;
+  bool add_height(LegRows& rows, int count, std::size_t side, const State& x, const Covariance& prior) const;
+
   const LegStep& step_;
   Eigen::Vector3d gyro_;
   const LegConfig& config_;
@@ -73,19 +89,34 @@ class StanceTracker {
  public:
   explicit StanceTracker(const LegConfig& config) : config_(config) {}
 
-  /// `omega`: bias-free, rad/s. `sigma_v`: uncertainty of the velocity of x, m/s.
-  LegStep step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0);
+  /// Whether the map's ground holds the feet, or how they stand on it is learned, since the height is known better without.
+  enum class Ground : std::uint8_t { use, learn };
+
+  /// `omega`: bias-free, rad/s. `sigma_v`: uncertainty of the velocity of x, m/s. `map`: on whose planes the feet come down.
+  LegStep step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0,
+               const VoxelMap* map = nullptr, Ground ground = Ground::use);
 
   /// Both feet leave the filter at the next step, to enter anew.
   void restart();
+  /// Which feet's rows were used of the last step. A foot that is refused for a while leaves; once it has come to rest it enters anew,
+  /// where it then is.
+  void judge(const LegStep& step, const std::array<bool, 2>& passed);
   bool standing(std::size_t side) const { return weights_[side].has_value(); }
 
  private:
   using Weights = std::array<double, max_corners>;
+  std::optional<GroundPatch> ground_under(const VoxelMap& map, const Eigen::Vector3d& p_W, const Eigen::Vector3d& up_W, Ground ground);
+  bool may_stand(std::size_t side, double speed2, double sigma_v);
+  bool stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega);
   LegConfig config_;
   std::optional<Time> last_;
   std::array<std::optional<Weights>, 2> weights_;  // of each standing foot
+  double sink_ = 0, sink_variance_ = 0;            // of the feet over the map's planes, as learned, m
   std::array<bool, 2> leave_ = {false, false};
+  std::array<bool, 2> slid_ = {false, false};   // left because it moved
+  std::array<std::optional<Time>, 2> refused_;  // since when
+  std::array<FootPose, 2> last_pose_;
+  std::array<Time, 2> changed_{};  // when the encoders of the foot last said something new
 };
 
 }  // namespace kilvo

@@ -82,18 +82,20 @@ TEST(LegMeasurements, TheResidualsAreTheVelocityAndTheOffsetOfAPointFixedToABody
 
 TEST(LegMeasurements, TheModelHoldsTwelveRowsForTwoFeetAndEachFootHasItsOwnColumns) {
   test::Random random(4);
-  const Estimate e = random_estimate(random, 0.1);
+  Estimate e = random_estimate(random, 0.1);
   const LegConfig config;
   LegStep step;
   step.dt = 0.001;
   const Eigen::Vector3d gyro = random.vector3(0.1);
-  for (Stance& foot : step.foot) {
+  for (std::size_t side = 0; side < 2; ++side) {
+    Stance& foot = step.foot[side];
     foot.used = true;
     foot.point = random_point(random);
+    e.x.pc[side] = e.x.pose() * foot.point.p;
     foot.point.v = resting(e.x, foot.point.p, gyro);
   }
   LegModel model(step, gyro, config);
-  const Rows<12> both = model(e.x, e.P);
+  const Rows<LegModel::max_leg_rows> both = model(e.x, e.P);
   ASSERT_EQ(both.r.size(), 12);
   EXPECT_TRUE(model.passed()[0] && model.passed()[1]);
   const Eigen::Matrix3d minus = -Eigen::Matrix3d::Identity();
@@ -103,7 +105,7 @@ TEST(LegMeasurements, TheModelHoldsTwelveRowsForTwoFeetAndEachFootHasItsOwnColum
   EXPECT_TRUE((both.H.block<6, 3>(6, at::pcl).isZero(0)));
   EXPECT_GT(both.R.diagonal().minCoeff(), 0);
   step.foot[0].used = false;
-  const Rows<12> right = model(e.x, e.P);
+  const Rows<LegModel::max_leg_rows> right = model(e.x, e.P);
   ASSERT_EQ(right.r.size(), 6);
   EXPECT_EQ(Eigen::VectorXd(right.r), Eigen::VectorXd(both.r.tail<6>()));
   EXPECT_EQ(Eigen::MatrixXd(right.H), Eigen::MatrixXd(both.H.bottomRows<6>()));
@@ -120,7 +122,7 @@ TEST(LegMeasurements, AFootThatIsFarFasterThanTheStateAllowsIsLeftOutAndTheOther
   for (Stance& foot : step.foot) foot.used = true;
   step.foot[0].point.v = {2, 0, 0};
   LegModel model(step, Eigen::Vector3d::Zero(), config);
-  const Rows<12> rows = model(e.x, e.P);
+  const Rows<LegModel::max_leg_rows> rows = model(e.x, e.P);
   ASSERT_EQ(rows.r.size(), 6);
   EXPECT_FALSE(model.passed()[0]);
   EXPECT_TRUE(model.passed()[1]);
@@ -128,6 +130,71 @@ TEST(LegMeasurements, AFootThatIsFarFasterThanTheStateAllowsIsLeftOutAndTheOther
   EXPECT_EQ(Eigen::Matrix3d(rows.H.block<3, 3>(3, at::pcr)), Eigen::Matrix3d(-Eigen::Matrix3d::Identity()));
   e.P.diagonal().segment<3>(at::v).setConstant(4);
   EXPECT_EQ(model(e.x, e.P).r.size(), 12) << "a state that knows nothing of its velocity cannot judge";
+}
+
+// Eq. 8 loosens what moves, but no foot can loosen its own gate.
+TEST(LegMeasurements, TheGateDoesNotOpenForAFootThatIsLooseBecauseItMoves) {
+  Estimate e;
+  e.P.diagonal().setConstant(1e-6);
+  const LegConfig config;
+  LegStep step;
+  step.dt = 0.001;
+  for (Stance& foot : step.foot) foot.used = true;
+  LegModel model(step, Eigen::Vector3d::Zero(), config);
+  step.foot[0].looseness = 100;
+  step.foot[0].point.v = {0.25, 0, 0};
+  model(e.x, e.P);
+  EXPECT_EQ(model.passed(), (std::array<bool, 2>{false, true}));
+  step.foot[0].point.v = {0.1, 0, 0};
+  model(e.x, e.P);
+  EXPECT_EQ(model.passed(), (std::array<bool, 2>{true, true})) << "soles settle and roll";
+}
+
+TEST(LegMeasurements, TheGateClosesForAFootThatIsNotWhereItStood) {
+  Estimate e;
+  const LegConfig config;
+  LegStep step;
+  step.dt = 0.001;
+  for (Stance& foot : step.foot) foot.used = true;
+  LegModel model(step, Eigen::Vector3d::Zero(), config);
+  e.x.pc[1] = {0, 0.03, 0};
+  model(e.x, e.P);
+  EXPECT_EQ(model.passed(), (std::array<bool, 2>{true, false}));
+  e.P.diagonal().segment<3>(at::pcr).setConstant(1e-4);
+  model(e.x, e.P);
+  EXPECT_EQ(model.passed(), (std::array<bool, 2>{true, true})) << "after a while it may have moved so far";
+}
+
+TEST(LegMeasurements, TheJacobianOfTheHeightIsWhatCentralDifferencesSay) {
+  test::Random random(12);
+  for (int i = 0; i < 20; ++i) {
+    const State x = test::random_state(random);
+    const GroundPatch ground{random.vector3(1).normalized(), random.vector3(2), 0.01};
+    const FootHeightRow row = foot_height(ground, x.pc[0]);
+    EXPECT_NEAR(row.r, ground.normal.dot(x.pc[0] - ground.point), 1e-12);
+    Eigen::Matrix<double, 1, at::size> J = Eigen::Matrix<double, 1, at::size>::Zero();
+    J.middleCols<3>(at::pcl) = row.J_pc;
+    const auto height = [&](const State& y) { return Eigen::Vector3d(foot_height(ground, y.pc[0]).r, 0, 0); };
+    EXPECT_LT((J - numeric_jacobian(x, height).row(0)).norm(), 1e-7);
+  }
+}
+
+TEST(LegMeasurements, OnGroundThatIsKnownAFootHasOneMoreRowUnlessItStandsOnSomethingElse) {
+  Estimate e;
+  e.P.diagonal().setConstant(1e-4);
+  const LegConfig config;
+  LegStep step;
+  step.dt = 0.001;
+  step.foot[1].used = true;
+  step.foot[1].ground = GroundPatch{Eigen::Vector3d::UnitZ(), {5, 5, -0.02}, 0.003};
+  LegModel model(step, Eigen::Vector3d::Zero(), config);
+  const auto rows = model(e.x, e.P);
+  ASSERT_EQ(rows.r.size(), 7);
+  EXPECT_NEAR(rows.r[6], 0.02, 1e-12);
+  EXPECT_EQ(Eigen::RowVector3d(rows.H.block<1, 3>(6, at::pcr)), Eigen::RowVector3d(0, 0, 1));
+  EXPECT_NEAR(std::sqrt(rows.R(6, 6)), std::hypot(0.003, config.ground_sigma), 1e-12);
+  step.foot[1].ground->point.z() = -0.2;
+  EXPECT_EQ(model(e.x, e.P).r.size(), 6) << "a stair";
 }
 
 // The new contact position as a function of the error of the old state.

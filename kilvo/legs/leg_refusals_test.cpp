@@ -1,6 +1,8 @@
 // Robots whose legs cannot be used.
+#include <algorithm>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <limits>
 #include <stdexcept>
 
 #include "kilvo/legs/leg_kinematics.hpp"
@@ -43,6 +45,44 @@ TEST(LegKinematics, ARobotThatCannotBeUsedIsRefusedByTheNameOfWhatIsWrong) {
     robot.feet[0].sole.assign(corners, Eigen::Vector3d::Zero());
     EXPECT_THAT(refusal_of(robot), AllOf(HasSubstr("left"), HasSubstr("sole")));
   }
+}
+
+TEST(LegKinematics, WhatTheUrdfParserSaysIsInTheErrorAndNotOnTheScreen) {
+  test::Random random(9);
+  Robot robot = test::biped(random);
+  const std::string joint = "<joint name=\"left_3\"";
+  robot.urdf.replace(robot.urdf.find(joint), joint.size(), "<joint nome=\"left_3\"");
+  testing::internal::CaptureStderr();
+  const std::string refusal = refusal_of(robot);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_THAT(refusal, AllOf(HasSubstr("robot.urdf"), HasSubstr("joint")));
+}
+
+TEST(LegKinematics, MessagesOfAnotherRobotAreToldFromDamagedOnes) {
+  test::Random random(9);
+  const Robot robot = test::biped(random);
+  const LegKinematics legs(robot);
+  JointSample s = test::random_joints(random);
+  EXPECT_EQ(legs.mismatch(s), std::nullopt);
+  s.position[2] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(legs.mismatch(s), std::nullopt) << "a bad value is not another robot";
+  s.names[static_cast<std::size_t>(std::ranges::find(s.names, "left_3") - s.names.begin())] = "tail";
+  EXPECT_THAT(legs.mismatch(s).value_or(""), AllOf(HasSubstr("left_3"), HasSubstr("locked_joints")));
+}
+
+TEST(LegKinematics, TwoFeetAreSixPositionsAndNotTwelveAngles) {
+  Robot robot;
+  robot.legs.type = "feet";
+  LegKinematics legs(robot);
+  JointSample s;
+  s.position.assign(12, 0.1);
+  s.velocity.assign(12, 0.0);
+  EXPECT_THAT(legs.mismatch(s).value_or(""), AllOf(HasSubstr("feet"), HasSubstr("12")));
+  EXPECT_TRUE(std::holds_alternative<std::string>(legs.feet(s)));
+  s.position.resize(6);
+  s.velocity.resize(6);
+  EXPECT_EQ(legs.mismatch(s), std::nullopt);
+  EXPECT_TRUE(std::holds_alternative<Feet>(legs.feet(s)));
 }
 
 TEST(LegKinematics, AFloatingJointOnTheWayIsRefusedUnlessItIsLocked) {

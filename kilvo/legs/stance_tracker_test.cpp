@@ -7,6 +7,7 @@
 #include "kilvo/filter/predict.hpp"
 #include "kilvo/filter/update.hpp"
 #include "kilvo/legs/leg_measurements.hpp"
+#include "tests/helpers/surface_groups.hpp"
 #include "tests/helpers/synthetic_gait.hpp"
 
 namespace kilvo {
@@ -246,6 +247,83 @@ TEST(StanceTracker, AFootEntersAfterItsDelayLooselyAndLeavesWithItsContact) {
   }
   EXPECT_GE(entered, 10);
   EXPECT_GE(left, entered);
+}
+
+TEST(StanceTracker, AFootThatIsRefusedForLongLeavesAndEntersAnewWhereItComesToRest) {
+  LegConfig config;
+  ContactEstimator contacts(config);
+  StanceTracker tracker(config);
+  const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
+  int ended = 0, began_again = 0, between = 0;
+  for (int i = 0; i < 400; ++i) {
+    const double s = 1e-3 * i;
+    const bool slides = i >= 100 && i < 250;
+    SoleMotion left = standing(0);
+    left.p.x() = 0.1 * std::clamp(s - 0.1, 0.0, 0.15);
+    left.v.x() = slides ? 0.1 : 0;
+    Feet feet;
+    feet.t = test::gait_begin + from_seconds(s);
+    feet.foot = {test::seen_from(body, left), test::seen_from(body, standing(1))};
+    contacts.update(feet, body, Eigen::Vector3d::Zero(), level_imu.accel);
+    ASSERT_TRUE(contacts.contacts().on[0]) << "slower than a swing: reported as standing";
+    const LegStep step = tracker.step(feet, contacts, body, Eigen::Vector3d::Zero());
+    tracker.judge(step, {step.foot[0].used && !slides, step.foot[1].used});
+    EXPECT_TRUE(step.foot[1].used);
+    ended += step.foot[0].ends ? 1 : 0;
+    began_again += i > 0 && step.foot[0].begins ? 1 : 0;
+    if (i > 125 && i < 250) between += step.foot[0].used ? 1 : 0;
+    EXPECT_TRUE(i <= 260 || step.foot[0].used);
+  }
+  EXPECT_EQ(ended, 1);
+  EXPECT_EQ(began_again, 1);
+  EXPECT_EQ(between, 0);
+}
+
+TEST(StanceTracker, AFootWhoseEncodersAreFrozenWhileTheBodyTurnsIsNotUsed) {
+  for (const double rate : {0.0, 0.5}) {
+    LegConfig config;
+    ContactEstimator contacts(config);
+    StanceTracker tracker(config);
+    const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
+    LegStep step;
+    for (int i = 0; i < 300; ++i) {
+      Feet feet;
+      feet.t = test::gait_begin + from_seconds(1e-3 * i);
+      feet.foot = {test::seen_from(body, standing(0)), test::seen_from(body, standing(1))};
+      feet.foot[1].p[0].x() += 1e-9 * i;
+      contacts.update(feet, body, Eigen::Vector3d::Zero(), level_imu.accel);
+      step = tracker.step(feet, contacts, body, Eigen::Vector3d(0, 0, rate));
+    }
+    EXPECT_EQ(step.foot[0].used, rate == 0) << "a robot at rest may repeat itself";
+    EXPECT_EQ(tracker.standing(1), true);
+  }
+}
+
+TEST(StanceTracker, TheGroundCountsOnceAtEachTouchdownAndOnlyWhereThereIsAMap) {
+  const MapConfig map_config;
+  VoxelMap map(map_config);
+  const auto floor = test::groups_of(test::points_on({-1, -1, 0}, {5, 0, 0}, {0, 2, 0}, 0.04), map_config.voxel_size / 4, 1e-5);
+  for (int i = 0; i < 3; ++i) map.insert(floor, 0);
+  test::Gait gait;
+  for (const VoxelMap* ground : {static_cast<const VoxelMap*>(nullptr), static_cast<const VoxelMap*>(&map)}) {
+    LegConfig config;
+    ContactEstimator contacts(config);
+    StanceTracker tracker(config);
+    int entered = 0, with_ground = 0;
+    for (int i = 0; i < 4000; ++i) {
+      const double s = 1e-3 * i;
+      const Feet feet = gait.feet(s);
+      contacts.update(feet, gait.body(s), Eigen::Vector3d::Zero(), level_imu.accel);
+      const LegStep step = tracker.step(feet, contacts, gait.body(s), Eigen::Vector3d::Zero(), 0, ground);
+      for (const Stance& foot : step.foot) {
+        entered += foot.begins ? 1 : 0;
+        with_ground += foot.ground ? 1 : 0;
+        EXPECT_TRUE(!foot.ground || (foot.begins && std::abs(foot.ground->height_of({2, 0, 0})) < 0.005));
+      }
+    }
+    EXPECT_GT(entered, 5);
+    EXPECT_EQ(with_ground, ground == nullptr ? 0 : entered);
+  }
 }
 
 TEST(StanceTracker, AfterARestartBothFeetLeaveAndEnterAnewInOneStep) {

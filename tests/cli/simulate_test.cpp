@@ -57,6 +57,19 @@ struct Simulated {
               "/points=sensor_msgs/PointCloud2=50\n");
   }
 
+  // The legs of another robot are refused by the first message, with the name of the joint that it lacks.
+  void expect_that_another_robot_is_refused() const {
+    const std::string robots = std::string(KILVO_SOURCE_DIR) + "/config/robots/";
+    const Finished joints = kilvo({"run", folder / "sim", "--config", robots + "icub.yaml", "--out", folder / "icub"});
+    EXPECT_EQ(joints.code, 2);
+    EXPECT_THAT(joints.err, AllOf(HasSubstr("icub.yaml"), HasSubstr("joint "), HasSubstr("robot.locked_joints")));
+    const std::string hr2 = std::string(KILVO_SOURCE_DIR) + "/config/datasets/hr2_kilo.yaml";
+    const Finished feet = kilvo({"run", folder / "sim", "--config", hr2, "--set", "imu.topic=/imu", "--set", "legs.topic=/joint_states",
+                                 "--sensors", "legs,imu", "--out", folder / "hr2"});
+    EXPECT_EQ(feet.code, 2);
+    EXPECT_THAT(feet.err, AllOf(HasSubstr("two feet"), HasSubstr("13")));
+  }
+
   void expect_that_kilvo_runs_on_it() const {
     const std::string out = folder / "li";
     const Finished f = kilvo({"run", folder / "sim", "--sensors", "imu,lidar", "--out", out});
@@ -117,6 +130,7 @@ TEST(Simulate, AWalkIsWrittenReadByOthersAndRunOn) {
   walk.expect_files();
   walk.expect_the_shipped_robot();
   walk.expect_that_ros_reads_it();
+  walk.expect_that_another_robot_is_refused();
   walk.expect_that_kilvo_runs_on_it();
 }
 
