@@ -14,9 +14,9 @@ namespace kilvo {
 
 struct UpdateConfig {
   int max_iterations = 5;
-  int min_iterations = 1;         // of a model that is coarse at first; no setting
   double rotation_step = 5e-5;  // rad
   double position_step = 2e-4;  // m
+  int min_iterations = 1;       // of a model that is coarse at first; no setting
 
   static constexpr auto fields() {
     return std::tuple{Field{"max_iterations", &UpdateConfig::max_iterations, "-", "iterations of one update at most"},

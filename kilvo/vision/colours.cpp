@@ -10,7 +10,7 @@ constexpr double nearest = 0.5;   // m; closer is no better
 constexpr int overexposed = 250;  // of a channel: how bright it really was, nobody knows
 constexpr float of_overexposed = 0.02F;
 
-std::uint8_t exposed(int value, double tau) { return static_cast<std::uint8_t>(std::lround(std::clamp(value * tau, 0.0, 255.0))); }
+std::uint8_t exposed(int value, double tau) { return static_cast<std::uint8_t>(std::clamp(value * tau, 0.0, 255.0) + 0.5); }
 
 }  // namespace
 
@@ -22,7 +22,7 @@ std::vector<ColouredPoint> colours_of(const Image& image, double tau, const Came
     const Eigen::Vector3d p_W = view.point(seen), p_C = T_CW * p_W;
     const auto pixel = camera.project(p_C);
     if (!pixel || !camera.sees(*pixel, 0)) continue;
-    const auto u = static_cast<std::size_t>(std::lround(pixel->x())), v = static_cast<std::size_t>(std::lround(pixel->y()));
+    const auto u = static_cast<std::size_t>(pixel->x() + 0.5), v = static_cast<std::size_t>(pixel->y() + 0.5);
     const std::uint8_t* value = image.pixels.data() + channels * (v * width + u);
     ColouredPoint& point = out.emplace_back();
     point.p_W = p_W.cast<float>();

@@ -163,6 +163,17 @@ bool PhotometricModel::gate(const Part& part, const Eigen::Matrix3d& M, const Ei
   return displacement.dot(S.inverse() * displacement) < config_.gate * config_.gate;
 }
 
+PhotometricModel::Group& PhotometricModel::group_of(std::uint32_t frame, const State& x, const Covariance& prior) {
+  const auto known = std::ranges::find_if(groups_, [frame](const Group& g) { return g.frame == frame; });
+  if (known != groups_.end()) return *known;
+  Group group;
+  group.frame = frame;
+  const PoseCovariance G = from_origin(x.pose());
+  group.P = prior.topLeftCorner<6, 6>() + G * map_.frame(frame).noise.topLeftCorner<6, 6>() * G.transpose();
+  groups_.push_back(group);
+  return groups_.back();
+}
+
 void PhotometricModel::add(std::size_t i, const Part& part, double scale2, const State& x, const Covariance& prior) {
   const Prepared& p = prepared_[i];
   const double zoom = 1.0 / (1 << level_);
@@ -177,10 +188,8 @@ void PhotometricModel::add(std::size_t i, const Part& part, double scale2, const
   const Eigen::Vector2d slide = part.view.J_point * p.slide_W;
   Eigen::Matrix2d shift = p.depth_variance * slide * slide.transpose();
   shift.diagonal().array() += config_.pixel_error * config_.pixel_error;
-  const VisualFrame& frame = map_.frame(p.frame);
-  const PoseCovariance G = from_origin(x.pose());
-  const PoseCovariance P = prior.topLeftCorner<6, 6>() + G * frame.noise.topLeftCorner<6, 6>() * G.transpose();
-  if (!gate(part, M, b, P, shift)) {
+  Group& group = group_of(p.frame, x, prior);
+  if (!gate(part, M, b, group.P, shift)) {
     verdicts_[i].moved = true;
     ++report_.moved;
     return;
@@ -197,12 +206,11 @@ void PhotometricModel::add(std::size_t i, const Part& part, double scale2, const
   Eigen::Matrix<double, 3, 7> J = Eigen::Matrix<double, 3, 7>::Zero();
   J.topLeftCorner<2, 6>() = part.view.J;
   J(2, 6) = 1;
-  auto group = std::find_if(groups_.begin(), groups_.end(), [&](const Group& g) { return g.frame == p.frame; });
-  if (group == groups_.end()) group = groups_.insert(groups_.end(), Group{p.frame, {}});
-  group->info.A += weight * J.transpose() * M * J;
-  group->info.b += weight * J.transpose() * b;
-  group->info.chi2 += weight * b.dot(M.inverse() * b);
-  ++group->info.rows;
+  const Eigen::Matrix<double, 7, 3> JM = weight * J.transpose() * M;
+  group.info.A.noalias() += JM * J;
+  group.info.b.noalias() += weight * J.transpose() * b;
+  group.info.chi2 += weight * z * z * 2;
+  ++group.info.rows;
   verdicts_[i].used = true;
 }
 

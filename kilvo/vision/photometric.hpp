@@ -84,6 +84,8 @@ class PhotometricModel {
   void prepare(int level);
   Part evaluate(std::size_t i, const State& x);
   bool gate(const Part& part, const Eigen::Matrix3d& M, const Eigen::Vector3d& b, const PoseCovariance& P, const Eigen::Matrix2d& shift) const;
+  struct Group;
+  Group& group_of(std::uint32_t frame, const State& x, const Covariance& prior);
   void add(std::size_t i, const Part& part, double scale2, const State& x, const Covariance& prior);
 
   const VisualMap& map_;
@@ -100,6 +102,7 @@ class PhotometricModel {
   Report report_;
   struct Group {
     std::uint32_t frame = 0;
+    PoseCovariance P = PoseCovariance::Zero();  // of the pose, and of the frame's, seen from the iterate
     Information<7> info;
   };
   std::vector<Group> groups_;

@@ -34,27 +34,28 @@ struct View {
 // The observation whose view is most like this one; of those that are alike, the oldest, which has drifted least.
 bool choose_observation(const View& view, const VisualPoint& p, Track& track) {
   constexpr double alike_scale = 0.25, alike_angle = 0.2;  // octaves, rad
-  const Eigen::Vector3d n = p.normal_W.cast<double>();
-  const Eigen::Vector3d towards = (view.eye_W - p.p_W).normalized();
+  const Eigen::Vector3d towards = view.eye_W - p.p_W;
+  const double distance = towards.norm();
   double best = 1e9;
   for (std::size_t k = 0; k < p.count; ++k) {
     const Observation& o = view.map.observation(p.observations[k]);
     const SE3& T_RW = view.map.frame(o.frame).T_CW;
-    const Eigen::Vector3d from = (-(T_RW.R.inverse() * T_RW.p) - p.p_W).normalized();
-    const double angle = std::acos(std::clamp(from.dot(towards), -1.0, 1.0));
+    const Eigen::Vector3d from = -(T_RW.R.inverse() * T_RW.p) - p.p_W;
+    const double reference = from.norm();
+    const double angle = std::acos(std::clamp(from.dot(towards) / (reference * distance), -1.0, 1.0));
     if (angle > most_turned) continue;
-    const auto A = affine_between(view.camera, view.T_CW, T_RW, p.p_W, n);
-    if (!A) continue;
-    const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(A->determinant()))));
+    const double octaves = std::abs(std::log2(reference / distance));
     const double unlike = std::max(0.0, octaves - alike_scale) + std::max(0.0, angle - alike_angle) + 2 * (1 - static_cast<double>(o.agreement));
-    if (unlike < best) {
-      best = unlike;
-      track.observation = p.observations[k];
-      track.A = *A;
-      track.view_angle = angle;
-    }
+    if (unlike >= best) continue;
+    best = unlike;
+    track.observation = p.observations[k];
+    track.view_angle = angle;
   }
-  return best < 1e9;
+  if (best >= 1e9) return false;
+  const SE3& T_RW = view.map.frame(view.map.observation(track.observation).frame).T_CW;
+  const auto A = affine_between(view.camera, view.T_CW, T_RW, p.p_W, p.normal_W.cast<double>());
+  if (A) track.A = *A;
+  return A.has_value();
 }
 
 }  // namespace
