@@ -18,6 +18,7 @@
 #include "kilvo/map/voxel_map.hpp"
 #include "kilvo/sensors/robot.hpp"
 #include "kilvo/vision/camera.hpp"
+#include "kilvo/vision/mount_check.hpp"
 #include "kilvo/vision/photometric.hpp"
 
 namespace kilvo {
@@ -79,6 +80,7 @@ class Estimator {
   // images.cpp
   const char* image_fault(const CameraImage& image);
   void process(const CameraImage& image);
+  void check_mount(const PhotometricModel& model, const SO3& R_WI);
   void learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid, const DepthView& depth,
                   const Estimate& prior);
 
@@ -113,6 +115,8 @@ class Estimator {
   std::optional<Camera> camera_;
   SE3 T_CI_;
   VisualMap visual_map_;
+  MountCheck mount_check_;
+  bool mount_is_doubted_ = false;
   std::vector<PointXYZI> seen_W_;      // points of the last sweep
   std::vector<std::uint8_t> picture_;             // of the last image
   std::optional<Eigen::Vector3d> last_seen_from_;  // where the last image was taken, m

@@ -72,11 +72,32 @@ void Estimator::process(const CameraImage& image) {
   if (!weak_.isZero(0) && model.report().used >= enough) map_error_.seen(T_WI, model.by_frame(), weak_, last_seen_from_ ? (T_WI.p - *last_seen_from_).norm() : 0);
   last_seen_from_ = T_WI.p;
   learn_from(model, tracks, pyramid, depth, prior);
+  check_mount(model, prior.x.R);
   settle(*estimate_);
   last_image_ = image.t;
   Output& seen = images_.emplace_back();
   seen.coloured = colours_of(image.image, estimate_->x.tau, *camera_, T_CI_ * estimate_->x.pose().inverse(), depth);
   seen.stages.visual_us = watch.lap_us();
+}
+
+void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI) {
+  if (mount_is_doubted_) return;
+  for (const PhotometricModel::Turn& turn : model.turns()) {
+    const SO3 R_IW = T_CI_.R.inverse() * visual_map_.frame(turn.frame).T_CW.R;
+    mount_check_.add(R_WI, R_IW.inverse(), turn.A, turn.b);
+  }
+  const auto psi = mount_check_.misalignment();
+  if (!psi) return;
+  mount_is_doubted_ = true;
+  const auto tenths = [](double value) {
+    std::string text = std::to_string(std::round(10 * value) / 10);
+    text.resize(text.find('.') + 2);
+    return text;
+  };
+  const Eigen::Vector3d degrees = *psi * (180 / M_PI);
+  statistics_.warnings.push_back("the images fit a camera that is turned by " + tenths(degrees.norm()) + " degrees (" + tenths(degrees.x()) +
+                                 ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()) +
+                                 " about the axes of the IMU) against camera.T_imu_camera.R: is the calibration of this robot?");
 }
 
 void Estimator::learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,

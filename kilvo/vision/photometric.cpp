@@ -150,17 +150,23 @@ PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x)
   return out;
 }
 
-// A patch that is found farther from its place than pose, depth and frame explain is something else that looks alike.
-bool PhotometricModel::gate(const Part& part, const Eigen::Matrix3d& M, const Eigen::Vector3d& b, const PoseCovariance& P,
-                            const Eigen::Matrix2d& shift) const {
-  if (!(M(2, 2) > 0)) return false;
+std::optional<PhotometricModel::Found> PhotometricModel::find(const Eigen::Matrix3d& M, const Eigen::Vector3d& b, const Eigen::Matrix2d& shift) {
+  if (!(M(2, 2) > 0)) return std::nullopt;
   const Eigen::Matrix2d A = M.topLeftCorner<2, 2>() - M.topRightCorner<2, 1>() * M.bottomLeftCorner<1, 2>() / M(2, 2);
-  const Eigen::Vector2d h = b.head<2>() - M.topRightCorner<2, 1>() * b[2] / M(2, 2);
-  if (!(A.determinant() > 0)) return false;
-  const Eigen::Matrix2d variance = A.inverse();
-  const Eigen::Vector2d displacement = variance * h;
-  const Eigen::Matrix2d S = variance + shift + part.view.J * P * part.view.J.transpose();
-  return displacement.dot(S.inverse() * displacement) < config_.gate * config_.gate;
+  if (!(A.determinant() > 0)) return std::nullopt;
+  const Eigen::Matrix2d inverse = A.inverse();
+  return Found{inverse * (b.head<2>() - M.topRightCorner<2, 1>() * b[2] / M(2, 2)), inverse + shift};
+}
+
+void PhotometricModel::note_turn(std::uint32_t frame, const Part& part, const Found& found) {
+  constexpr double most = 6;  // px; farther, the patch has hardly been found
+  if (found.displacement.squaredNorm() > most * most) return;
+  auto turn = std::ranges::find_if(turns_, [frame](const Turn& t) { return t.frame == frame; });
+  if (turn == turns_.end()) turn = turns_.insert(turns_.end(), Turn{frame, Eigen::Matrix3d::Zero(), Eigen::Vector3d::Zero()});
+  const Eigen::Matrix<double, 3, 2> JW = part.view.J.leftCols<3>().transpose() * found.variance.inverse();
+  turn->A += JW * part.view.J.leftCols<3>();
+  // r = I(u) - T: what the image shows at u lies `displacement` beyond its place, so the body must turn by the opposite.
+  turn->b -= JW * found.displacement;
 }
 
 PhotometricModel::Group& PhotometricModel::group_of(std::uint32_t frame, const State& x, const Covariance& prior) {
@@ -189,7 +195,12 @@ void PhotometricModel::add(std::size_t i, const Part& part, double scale2, const
   Eigen::Matrix2d shift = p.depth_variance * slide * slide.transpose();
   shift.diagonal().array() += config_.pixel_error * config_.pixel_error;
   Group& group = group_of(p.frame, x, prior);
-  if (!gate(part, M, b, group.P, shift)) {
+  const auto found = find(M, b, shift);
+  if (!found) return;
+  if (call_ == 1) note_turn(p.frame, part, *found);
+  // A patch that is found farther from its place than pose, depth and frame explain is something else that looks alike.
+  const Eigen::Matrix2d S = found->variance + part.view.J * group.P * part.view.J.transpose();
+  if (found->displacement.dot(S.inverse() * found->displacement) > config_.gate * config_.gate) {
     verdicts_[i].moved = true;
     ++report_.moved;
     return;

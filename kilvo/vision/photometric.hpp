@@ -55,12 +55,21 @@ class PhotometricModel {
 
   Information<7> operator()(const State& x, const Covariance& prior);
 
+  /// What one frame's patches say of a turn of the body, before any was refused for being found elsewhere than expected.
+  struct Turn {
+    std::uint32_t frame = 0;
+    Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d b = Eigen::Vector3d::Zero();  // A * turn
+  };
+
   /// How often it must be called to be at the finest level.
   int iterations() const { return static_cast<int>(schedule_.size()); }
 
   /// The inverse exposure that makes the image as bright as the patches: a median. None with too few of them.
   std::optional<double> exposure_at(const State& x) const;
 
+  /// Of the first evaluation.
+  const std::vector<Turn>& turns() const { return turns_; }
   // Of the last evaluation:
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
   const Report& report() const { return report_; }
@@ -83,7 +92,13 @@ class PhotometricModel {
   };
   void prepare(int level);
   Part evaluate(std::size_t i, const State& x);
-  bool gate(const Part& part, const Eigen::Matrix3d& M, const Eigen::Vector3d& b, const PoseCovariance& P, const Eigen::Matrix2d& shift) const;
+  /// Where a patch is found: how far from where it is seen, and how surely, by itself.
+  struct Found {
+    Eigen::Vector2d displacement;  // px
+    Eigen::Matrix2d variance;      // px^2
+  };
+  static std::optional<Found> find(const Eigen::Matrix3d& M, const Eigen::Vector3d& b, const Eigen::Matrix2d& shift);
+  void note_turn(std::uint32_t frame, const Part& part, const Found& found);
   struct Group;
   Group& group_of(std::uint32_t frame, const State& x, const Covariance& prior);
   void add(std::size_t i, const Part& part, double scale2, const State& x, const Covariance& prior);
@@ -107,6 +122,7 @@ class PhotometricModel {
   };
   std::vector<Group> groups_;
   std::vector<EpochInformation> by_frame_;
+  std::vector<Turn> turns_;
 };
 
 }  // namespace kilvo

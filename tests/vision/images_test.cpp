@@ -1,0 +1,190 @@
+// What images do for the estimate of a walking humanoid, and what bad ones must not do.
+#include <algorithm>
+#include <functional>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <memory>
+
+#include "kilvo/estimator/estimator.hpp"
+#include "lab/settings/settings.hpp"
+#include "lab/simulation/description.hpp"
+#include "lab/simulation/failures.hpp"
+#include "tests/helpers/simulated.hpp"
+
+namespace kilvo {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::array<bool, sensor_count> liv = {true, false, true, true}, li = {true, false, true, false};
+
+struct Drive {
+  Statistics statistics;
+  double error = 0;      // of position, root mean square, m
+  double worst_tau = 0;  // of the exposure that the images had against that of the first, as a share
+  std::map<Modality, int> outputs;
+  std::map<Modality, std::string> cause;  // the last
+  std::size_t coloured = 0;
+};
+
+// Ten seconds through a room, seen by a camera of half size.
+class Images : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    lab::SimulatorConfig config = test::only({Sensor::imu, Sensor::lidar, Sensor::camera}, 10);
+    config.threads = 2;
+    config.lidar.points = 8000;
+    config.camera.width = 320;
+    config.camera.height = 240;
+    config.camera.fx = config.camera.fy = 170.6;
+    config.camera.cx = 160.4;
+    config.camera.cy = 118.8;
+    simulator_ = std::make_unique<lab::Simulator>(test::scenario("room"), config);
+    settings_ = std::make_unique<lab::Settings>(
+        lab::parse_settings(lab::simulated_config(config, "sim.urdf"), "simulated", std::string(KILVO_SOURCE_DIR) + "/config/robots"));
+    while (auto m = simulator_->next()) walk_.push_back(*std::move(m));
+  }
+  static void TearDownTestSuite() {
+    simulator_.reset();
+    settings_.reset();
+    walk_.clear();
+  }
+
+  // `edit` may change an image or, by returning false, keep it away; it is given the time since the start, s.
+  static Drive drive(std::array<bool, sensor_count> used, const std::function<bool(CameraImage&, double)>& edit = {},
+                     const std::function<void(Robot&)>& mount = {}) {
+    Robot robot = settings_->robot;
+    if (mount) mount(robot);
+    Estimator estimator(robot, settings_->estimator, used);
+    Drive out;
+    double sum = 0;
+    int count = 0;
+    std::optional<SE3> T_WR;
+    std::optional<double> first_exposure;
+    const auto take = [&](const std::vector<Output>& outputs) {
+      for (const Output& o : outputs) {
+        const double t = simulator_->seconds_of(o.t);
+        const SE3 truth = simulator_->walk().imu(t);
+        if (!T_WR) T_WR = o.x.pose() * truth.inverse();
+        sum += (o.x.p - (*T_WR * truth).p).squaredNorm();
+        ++count;
+        ++out.outputs[o.modality];
+        out.cause[o.modality] = o.cause;
+        out.coloured += o.coloured.size();
+        if (!o.is_image) continue;
+        const double exposure = lab::exposure_at(simulator_->config().camera, t);
+        if (!first_exposure) first_exposure = exposure * o.x.tau;
+        out.worst_tau = std::max(out.worst_tau, std::abs(o.x.tau * exposure / *first_exposure - 1));
+      }
+    };
+    for (Measurement m : walk_) {
+      auto* image = std::get_if<CameraImage>(&m);
+      if (image != nullptr && edit && !edit(*image, simulator_->seconds_of(image->t))) continue;
+      take(estimator.push(std::move(m)));
+    }
+    take(estimator.finish());
+    out.error = std::sqrt(sum / count);
+    out.statistics = estimator.statistics();
+    return out;
+  }
+
+  static const SensorCount& camera_of(const Drive& d) { return d.statistics.sensors[static_cast<std::size_t>(Sensor::camera)]; }
+
+  static std::unique_ptr<lab::Simulator> simulator_;
+  static std::unique_ptr<lab::Settings> settings_;
+  static std::vector<Measurement> walk_;
+};
+
+std::unique_ptr<lab::Simulator> Images::simulator_;
+std::unique_ptr<lab::Settings> Images::settings_;
+std::vector<Measurement> Images::walk_;
+
+TEST_F(Images, HelpAndTheExposureIsFollowed) {
+  const Drive with = drive(liv), without = drive(li);
+  EXPECT_LT(with.error, 1.05 * without.error);
+  EXPECT_LT(with.error, 0.003);
+  EXPECT_GT(camera_of(with).used, 90U);
+  EXPECT_LT(with.worst_tau, 0.03);
+  EXPECT_GT(with.outputs.at(Modality::liv), 9 * with.outputs.at(Modality::li));
+  EXPECT_GT(with.coloured, 10000U);
+  EXPECT_THAT(with.statistics.warnings, testing::Not(testing::Contains(HasSubstr("turned"))));
+}
+
+TEST_F(Images, ACameraThatGoesIsMissedAndOneThatComesBackIsUsed) {
+  const Drive d = drive(liv, [](CameraImage&, double t) { return t < 4 || t > 7; });
+  EXPECT_NEAR(d.outputs.at(Modality::li) / 200.0, 3 - 0.3, 0.6);
+  EXPECT_STREQ(d.cause.at(Modality::liv).c_str(), "images are used");
+  EXPECT_EQ(d.cause.at(Modality::li), "camera lost");
+  EXPECT_LT(d.error, 0.003);
+}
+
+TEST_F(Images, BadOnesAreCountedAndCostNothingButThemselves) {
+  const double good = drive(liv).error;
+  struct Case {
+    const char* cause;  // of the drops; empty: used, but says nothing
+    std::function<bool(CameraImage&, double)> edit;
+  };
+  const auto grey = [](std::uint8_t value) {
+    return [value](CameraImage& i, double t) {
+      if (t > 4 && t < 6) std::ranges::fill(i.image.pixels, value);
+      return true;
+    };
+  };
+  CameraImage last;
+  const std::vector<Case> cases = {
+      {"the same picture again", grey(0)},
+      {"the same picture again", grey(255)},
+      {"empty",
+       [](CameraImage& i, double t) {
+         if (t > 4 && t < 6) i.image = {};
+         return true;
+       }},
+      {"another size than configured",
+       [](CameraImage& i, double t) {
+         if (t > 4 && t < 6) i.image.height /= 2, i.image.pixels.resize(i.image.pixels.size() / 2);
+         return true;
+       }},
+      {"the same picture again",
+       [&last](CameraImage& i, double t) {
+         if (t > 4 && t < 6) i.image = last.image;
+         last = i;
+         return true;
+       }},
+      {"late",
+       [](CameraImage& i, double t) {
+         if (t > 6 && t < 7) i.t -= std::chrono::seconds(5);
+         return true;
+       }},
+      {"",
+       [&last](CameraImage& i, double t) {
+         const CameraImage whole = i;
+         const auto half = static_cast<std::ptrdiff_t>(i.image.pixels.size() / 2);
+         if (t > 4 && t < 6) std::copy_n(last.image.pixels.begin(), half, i.image.pixels.begin());
+         last = whole;
+         return true;
+       }},
+  };
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    const Drive d = drive(liv, cases[k].edit);
+    EXPECT_LT(d.error, 1.5 * good + 0.0005) << k;
+    if (cases[k].cause[0] != 0) EXPECT_GE(camera_of(d).dropped.at(cases[k].cause), 9U) << k;
+  }
+}
+
+TEST_F(Images, ACameraTurnedByThreeDegreesIsSpokenOf) {
+  for (const Eigen::Vector3d& axis : {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()}) {
+    const Drive d = drive(liv, {}, [&](Robot& r) { r.camera.T_imu_camera.R = SO3::Exp(3 * M_PI / 180 * axis) * r.camera.T_imu_camera.R; });
+    EXPECT_THAT(d.statistics.warnings, testing::Contains(HasSubstr("camera.T_imu_camera.R"))) << axis.transpose();
+  }
+}
+
+TEST_F(Images, WithoutAnySweepAreDropped) {
+  const Drive d = drive({true, false, false, true});
+  EXPECT_EQ(camera_of(d).used, 0U);
+  EXPECT_GT(camera_of(d).dropped.at("before the first sweep"), 50U);
+  EXPECT_EQ(d.outputs.size(), 1U);
+  EXPECT_TRUE(d.outputs.contains(Modality::coast));
+}
+
+}  // namespace
+}  // namespace kilvo
