@@ -95,9 +95,9 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI) {
     return text;
   };
   const Eigen::Vector3d degrees = *psi * (180 / M_PI);
-  statistics_.warnings.push_back("the images fit a camera that is turned by " + tenths(degrees.norm()) + " degrees (" + tenths(degrees.x()) +
+  statistics_.warnings.push_back("the images fit a camera that is turned by " + tenths(degrees.norm()) + " degrees or more (" + tenths(degrees.x()) +
                                  ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()) +
-                                 " about the axes of the IMU) against camera.T_imu_camera.R: is the calibration of this robot?");
+                                 " about the axes of the IMU) against camera.T_imu_camera.R: is the calibration that of this robot?");
 }
 
 void Estimator::learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,

@@ -8,10 +8,11 @@ namespace kilvo {
 namespace {
 
 constexpr int enough_views = 200;
-constexpr double worth_saying = 0.015;   // rad; what a careful calibration reaches is a tenth of it
-constexpr double sure = 6;               // standard deviations
-constexpr double best_view = 2e-4;       // rad; no view says more than this, however many patches it has
-constexpr double alike = 0.01;           // rad; views that are turned by less say nothing
+// A careful calibration reaches a tenth of this. What is found is less than what there is: patches that are far off are not found at all.
+constexpr double worth_saying = 0.005;  // rad
+constexpr double sure = 6;              // standard deviations
+constexpr double best_view = 2e-4;      // rad; no view says more than this, however many patches it has
+constexpr double alike = 0.01;          // rad; views that are turned by less say nothing
 
 }  // namespace
 

@@ -167,12 +167,13 @@ TEST_F(Images, BadOnesAreCountedAndCostNothingButThemselves) {
   for (std::size_t k = 0; k < cases.size(); ++k) {
     const Drive d = drive(liv, cases[k].edit);
     EXPECT_LT(d.error, 1.5 * good + 0.0005) << k;
-    if (cases[k].cause[0] != 0) EXPECT_GE(camera_of(d).dropped.at(cases[k].cause), 9U) << k;
+    if (cases[k].cause[0] == 0) continue;
+    EXPECT_GE(camera_of(d).dropped.at(cases[k].cause), 9U) << k;
   }
 }
 
 TEST_F(Images, ACameraTurnedByThreeDegreesIsSpokenOf) {
-  for (const Eigen::Vector3d& axis : {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()}) {
+  for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)}) {
     const Drive d = drive(liv, {}, [&](Robot& r) { r.camera.T_imu_camera.R = SO3::Exp(3 * M_PI / 180 * axis) * r.camera.T_imu_camera.R; });
     EXPECT_THAT(d.statistics.warnings, testing::Contains(HasSubstr("camera.T_imu_camera.R"))) << axis.transpose();
   }
