@@ -89,10 +89,12 @@ std::vector<Setting> list_settings(Settings& s) {
   list.pose("camera.T_imu_camera", robot.camera.T_imu_camera, "position of the camera in the IMU frame",
             "rotation from the camera's optical frame (z forward, x right, y down) to the IMU, row by row");
   list.fields("camera", robot.camera);
+  list.fields("camera", s.estimator.vision);
   list.fields("camera", noise, of_camera);
 
   list.fields("map", s.estimator.map);
   list.fields("map", s.mapping);
+  list.fields("map.visual", s.estimator.visual_map);
 
   list.fields("estimator", s.estimator);
   list.fields("estimator.initial", s.estimator.initial);
