@@ -4,11 +4,13 @@
 #include <cmath>
 #include <utility>
 
+#include "kilvo/estimator/timeline.hpp"
+
 namespace kilvo {
 namespace {
 
 // A measurement cannot have been taken so much later than the newest of the IMU, which arrives at once, s.
-constexpr double most_ahead = 0.25;
+constexpr double most_ahead = 0.25, witnessed_ahead = 0.12;
 // The clocks are compared over so long, s.
 constexpr double clock_window = 0.05;
 // So many messages without a repetition show that a sensor is alive and noisy: only then does sameness mean anything.
@@ -93,7 +95,7 @@ const char* Health::judge_repeats(const Measurement& m, StreamHealth& stream, Tr
       frozen = tracker.same >= imu_same;
       break;
     case Sensor::legs:
-      if (imu_motion_ < moving) return tracker.same = 0, nullptr;
+      if (imu_motion_ < moving && !tracker.frozen) return tracker.same = 0, nullptr;
       frozen = to_seconds(t - tracker.same_since) > legs_same;
       break;
     case Sensor::lidar:
@@ -129,15 +131,16 @@ bool Health::is_ahead(Sensor s, Time t, StreamHealth& stream, Tracker& tracker) 
   const double offset = to_seconds(t - *imu);
   if (std::abs(offset) < 1.0) stream.mean_lag += (-offset - stream.mean_lag) / static_cast<double>(stream.messages + 1);
   // Beyond a second it is a jump, which the timeline looks into.
-  if (offset < most_ahead || offset > 1.0) return false;
-  // All others ahead alike: it is the IMU that comes late.
+  if (offset < witnessed_ahead || offset > 1.0) return false;
+  // All others ahead alike: it is the IMU that comes late. If none is, they are witnesses.
   int others = 0, ahead = 0;
   for (std::size_t k = 1; k < sensor_count; ++k) {
     if (k == static_cast<std::size_t>(s) || !trackers_[k].stamp) continue;
     ++others;
-    ahead += to_seconds(*trackers_[k].stamp - *imu) > 0.5 * most_ahead ? 1 : 0;
+    ahead += to_seconds(*trackers_[k].stamp - *imu) > 0.5 * witnessed_ahead ? 1 : 0;
   }
   if (others > 0 && ahead == others) return false;
+  if (offset < most_ahead && (others == 0 || ahead > 0)) return false;
   stream.clock_offset += (offset - stream.clock_offset) / static_cast<double>(++stream.off_clock);
   return true;
 }
@@ -145,23 +148,23 @@ bool Health::is_ahead(Sensor s, Time t, StreamHealth& stream, Tracker& tracker) 
 void Health::watch_imu(const Measurement& m) {
   if (const auto* imu = std::get_if<ImuSample>(&m)) {
     imu_silence_ = 0;
-    for (Tracker& tracker : trackers_) tracker.heard_with_imu = tracker.stamp;
+    for (Tracker& tracker : trackers_) tracker.heard_since_imu.reset();
     const double share = std::min(1.0, 1.0 / (still_memory * rates_[0]));
     const Eigen::Vector3d off = imu->gyro - gyro_mean_;
     gyro_mean_ += share * off;
     imu_motion_ += share * (off.norm() - imu_motion_);
     return;
   }
-  const Tracker& tracker = trackers_[m.index()];
-  if (tracker.heard_with_imu && tracker.stamp)
-    imu_silence_ = std::max(imu_silence_, std::min(1.0, to_seconds(*tracker.stamp - *tracker.heard_with_imu)));
+  Tracker& tracker = trackers_[m.index()];
+  if (!tracker.heard_since_imu) tracker.heard_since_imu = tracker.stamp;
+  imu_silence_ = std::max(imu_silence_, std::min(1.0, to_seconds(*tracker.stamp - *tracker.heard_since_imu)));
 }
 
 const char* Health::judge(const Measurement& m) {
   const Sensor s = sensor_of(m);
   StreamHealth& stream = streams_[m.index()];
   Tracker& tracker = trackers_[m.index()];
-  const Time t = stamp_of(m);
+  const Time t = completion_of(m);
   if (tracker.stamp && t == *tracker.stamp) return nullptr;  // the timeline counts duplicates
   if (const char* same = judge_repeats(m, stream, tracker)) {
     ++stream.messages;

@@ -38,7 +38,7 @@ class Health {
  private:
   struct Tracker {
     std::optional<Time> stamp;           // of the newest
-    std::optional<Time> heard_with_imu;  // its newest stamp when the IMU spoke last
+    std::optional<Time> heard_since_imu;  // its first stamp since the IMU spoke last
     double interval_squares = 0;
     int same = 0;                            // messages in a row that said the same
     Time same_since{};                       // the first of them
