@@ -31,6 +31,8 @@ class Health {
   const char* judge(const Measurement& m);
 
   const std::array<StreamHealth, sensor_count>& streams() const { return streams_; }
+  /// The newest stamp of a sensor.
+  std::optional<Time> heard(Sensor s) const { return trackers_[static_cast<std::size_t>(s)].stamp; }
   bool is_frozen(Sensor s) const { return trackers_[static_cast<std::size_t>(s)].frozen; }
   /// How long the others have been speaking since the IMU did last, s: in arrival order, so that a constant delay is no silence.
   double imu_silence() const { return imu_silence_; }

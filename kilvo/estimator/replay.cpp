@@ -23,7 +23,7 @@ void Replay::add(const ImuSample& s) {
 
 // Beyond the end of its range an IMU may have seen anything of the same size.
 void Replay::say_clipped(ImuInterval& interval) const {
-  constexpr double gyro = 3, accel = 40;     // rad/s, m/s^2: what may be missing
+  constexpr double gyro = 3, accel = 20;     // rad/s, m/s^2: what may be missing
   constexpr double correlation = 0.01;       // s: it stays missing for so long
   interval.gyro_scale = gyro * gyro * correlation / (config_.noise.gyro * config_.noise.gyro);
   interval.accel_scale = accel * accel * correlation / (config_.noise.accel * config_.noise.accel);

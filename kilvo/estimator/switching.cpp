@@ -18,6 +18,8 @@ constexpr int consistent_sweeps = 3;
 // Sweeps that fitted nowhere for so long: the robot is where the map is not.
 constexpr Duration longest_refusal = std::chrono::seconds(2);
 
+std::string milliseconds_of(double seconds) { return std::to_string(std::lround(1e3 * seconds)) + " ms"; }
+
 }  // namespace
 
 void Estimator::choose_modality(Time t) {
@@ -89,7 +91,11 @@ bool Estimator::legs_may_return(Time t) {
   constexpr double known_velocity = 0.15;  // m/s
   if (!recovery_.legs_waiting) recovery_.legs_waiting = t;
   const double sigma_v = std::sqrt(std::max(0.0, estimate_->P.block<3, 3>(at::v, at::v).trace() / 3));
-  const bool ready = calm_.is_usual(t, calm) && (sigma_v < known_velocity || !uses(Sensor::lidar));
+  if (health_.is_frozen(Sensor::legs)) return false;
+  // Sweeps, if there are any, tell the velocity soon.
+  const auto heard = health_.heard(Sensor::lidar);
+  const bool sweeps = heard && t - *heard < silence(robot_.lidar.rate, 4, std::chrono::milliseconds(300));
+  const bool ready = calm_.is_usual(t, calm) && (sigma_v < known_velocity || !sweeps);
   if (!ready && t - *recovery_.legs_waiting < longest_wait) return false;
   recovery_.legs_waiting.reset();
   last_stance_ = t;
@@ -128,14 +134,14 @@ bool Estimator::register_sweep(const Estimate& prior, LidarModel& model, const s
                                const PoseCovariance& within_scan) {
   estimate_ = prior;
   if (map_.empty()) return true;
-  const auto with_noise = [&within_scan](Information<6> info) {
-    add_common_noise(within_scan, info);
-    return info;
-  };
   if (!needs_search(prior.P, PoseCovariance::Identity() - weak_)) {
     UpdateConfig patient = config_.update;
     if (recovery_.sweeps_to_go > 0) patient.max_iterations *= 3;
-    const auto measured = [&](const State& x, const Covariance& P) { return with_noise(model(x, P)); };
+    const auto measured = [&](const State& x, const Covariance& P) {
+      Information<6> info = model(x, P);
+      add_common_noise(within_scan, info);
+      return info;
+    };
     estimate_ = update(prior, measured, patient).posterior;
     return true;
   }
@@ -144,7 +150,17 @@ bool Estimator::register_sweep(const Estimate& prior, LidarModel& model, const s
   if (!found) return false;
   ++statistics_.found;
   recovery_.sweeps_to_go = consistent_sweeps;
-  const auto measured = [&](const State& x, const Covariance&) { return with_noise(information_at(*found, x)); };
+  // The scan was undistorted with a velocity and a tilt that were guesses.
+  constexpr double half_scan = 0.05, found_rotation = 0.006, found_position = 0.005;  // s, rad, m
+  const double sigma_v2 = prior.P.diagonal().segment<3>(at::v).maxCoeff();
+  PoseCovariance guessed = within_scan;
+  guessed.diagonal().head<3>().array() += found_rotation * found_rotation;
+  guessed.diagonal().tail<3>().array() += found_position * found_position + 0.25 * half_scan * half_scan * sigma_v2;
+  const auto measured = [&](const State& x, const Covariance&) {
+    Information<6> info = information_at(*found, x);
+    add_common_noise(guessed, info);
+    return info;
+  };
   estimate_ = update(prior, measured, config_.update).posterior;
   model(estimate_->x, estimate_->P);
   return true;
@@ -195,11 +211,11 @@ void Estimator::warn_of_streams() {
   for (std::size_t s = 0; s < sensor_count; ++s) {
     const StreamHealth& stream = statistics_.health[s];
     if (stream.off_clock > 4) {
-      say(s, "its clock is " + std::to_string(stream.clock_offset) + " s ahead of the IMU's: " + std::to_string(stream.off_clock) +
+      say(s, "its clock is " + milliseconds_of(stream.clock_offset) + " ahead of the IMU's: " + std::to_string(stream.off_clock) +
                  " messages were not used");
     }
     constexpr double late = 0.25;  // s
-    if (stream.mean_lag > late) say(s, "its messages come " + std::to_string(stream.mean_lag) + " s after the IMU's of the same time");
+    if (stream.mean_lag > late) say(s, "its messages come " + milliseconds_of(stream.mean_lag) + " after the IMU's of the same time");
     if (stream.frozen > 0) say(s, "frozen " + std::to_string(stream.frozen) + " times: it kept saying the same");
   }
 }

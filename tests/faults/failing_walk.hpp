@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -56,6 +56,16 @@ struct Outcome {
     std::vector<std::string> out;
     for (std::size_t i = 0; i < moments.size(); ++i) {
       if (i == 0 || moments[i].modality != moments[i - 1].modality) out.push_back(name_of(moments[i].modality));
+    }
+    return out;
+  }
+  double when_worst(double Moment::*part, double from, double until) const {
+    double out = 0, worst = 0;
+    for (const Moment& m : moments) {
+      if (m.s >= from && m.s < until && m.*part > worst) {
+        worst = m.*part;
+        out = m.s;
+      }
     }
     return out;
   }

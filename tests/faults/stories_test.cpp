@@ -33,9 +33,9 @@ class Faults : public testing::Test {
   static void say(const char* what, const Outcome& o, double from, double until) {
     std::printf("%-22s", what);
     for (const std::string& c : o.changes()) std::printf(" %s", c.c_str());
-    std::printf("  error %.3f m, %.1f sigmas, sigma %.3f m, rotation %.1f sigmas; at the end %.3f m; searched %d found %d anew %d\n",
+    std::printf("  error %.3f m, %.1f sigmas, sigma %.3f m, rotation %.1f sigmas (at %.2f s); at the end %.3f m; searched %d found %d anew %d\n",
                 o.worst(&Moment::error, from, until), o.worst(&Moment::sigmas, from, until), o.worst(&Moment::sigma, from, until),
-                o.worst(&Moment::tilt_sigmas, from, until), o.moments.back().error, static_cast<int>(o.statistics.searches),
+                o.worst(&Moment::tilt_sigmas, from, until), o.when_worst(&Moment::tilt_sigmas, from, until), o.moments.back().error, static_cast<int>(o.statistics.searches),
                 static_cast<int>(o.statistics.found), static_cast<int>(o.statistics.maps_begun_anew));
   }
 
@@ -118,7 +118,7 @@ TEST_F(Faults, AClockAheadOfTheImuIsMeasuredAndItsSensorNotUsed) {
     EXPECT_GT(h.off_clock, 50u);
     EXPECT_NEAR(h.clock_offset, 0.3, 0.02);
     EXPECT_LT(o.worst(&Moment::error, 6, 14), 0.05);
-    EXPECT_THAT(o.statistics.warnings, testing::Contains(testing::HasSubstr("clock is 0.3")));
+    EXPECT_THAT(o.statistics.warnings, testing::Contains(testing::HasSubstr("clock is 300 ms ahead")));
   }
 }
 
