@@ -40,6 +40,7 @@ class Recap {
   void add(const Output& output);
 
   StageClock stages;
+  std::map<std::string, std::uint64_t> degraded;  // sweeps and images that said too little, by sense
 
   std::size_t outputs() const { return outputs_; }
   std::size_t sweeps() const { return sweeps_; }

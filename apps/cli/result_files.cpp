@@ -35,6 +35,7 @@ void ResultFiles::write(const Output& output) {
   if (output.modality != last_modality_) write_modality(output);
   if (output.is_sweep || output.is_image) write_stages(output);
   if (output.contacts) write_contacts(output);
+  write_indicators(output);
   recap_.add(output);
 }
 
@@ -50,6 +51,25 @@ void ResultFiles::write_contacts(const Output& output) {
     timing_.write(fmt::format("{},{},{:.1f}", t, stage, microseconds));
     recap_.stages.add(stage, microseconds);
   }
+}
+
+// Sweeps and images have a row each; what the other says is left empty.
+void ResultFiles::write_indicators(const Output& output) {
+  if (output.indicators.empty()) return;
+  if (!degradation_) degradation_.emplace(folder_ / "degradation.csv", "t,lidar_ratio,lidar_weak,visual_points,lidar_degraded,visual_degraded");
+  std::string line, ratio, share, points;
+  bool lidar = false, visual = false;
+  for (const Indicator& i : output.indicators) {
+    const std::string_view name = i.name;
+    const bool is_lidar = name.starts_with("lidar");
+    (is_lidar ? lidar : visual) |= i.degraded;
+    (name == "lidar_ratio" ? ratio : is_lidar ? share : points) = fmt::format("{:.6g}", i.value);
+  }
+  lab::append_seconds(line, output.t);
+  const auto flag = [](const std::string& value, bool on) { return value.empty() ? "" : on ? "1" : "0"; };
+  degradation_->write(fmt::format("{},{},{},{},{},{}", line, ratio, share, points, flag(share, lidar), flag(points, visual)));
+  recap_.degraded["lidar"] += lidar ? 1 : 0;
+  recap_.degraded["visual"] += visual ? 1 : 0;
 }
 
 void ResultFiles::write_state(const Output& output) {
@@ -95,6 +115,7 @@ void ResultFiles::close() {
   modality_.close();
   timing_.close();
   if (contacts_) contacts_->close();
+  if (degradation_) degradation_->close();
 }
 
 }  // namespace kilvo::cli

@@ -26,11 +26,13 @@ class ResultFiles {
   void write_modality(const Output& output);
   void write_stages(const Output& output);
   void write_contacts(const Output& output);
+  void write_indicators(const Output& output);
 
   lab::TumWriter odometry_, sweeps_;
   CsvFile states_, modality_, timing_;
   std::filesystem::path folder_;
-  std::optional<CsvFile> contacts_;  // from the first leg sample on
+  std::optional<CsvFile> contacts_;     // from the first leg sample on
+  std::optional<CsvFile> degradation_;  // from the first sweep or image on
   std::optional<Modality> last_modality_;
   std::optional<Time> last_state_;
   Recap recap_;

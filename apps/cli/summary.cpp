@@ -41,6 +41,39 @@ Json messages_json(const RunFacts& facts, const lab::RecordingSource& source, co
   return out;
 }
 
+// Of the streams themselves: intervals between stamps, and what was wrong with the messages.
+Json health_json(const RunFacts& facts, const Statistics& statistics) {
+  Json out = Json::object();
+  for (const Sensor sensor : facts.sensors) {
+    const StreamHealth& h = statistics.health[static_cast<std::size_t>(sensor)];
+    const auto count = [&](const char* cause) {
+      const auto& dropped = statistics.sensors[static_cast<std::size_t>(sensor)].dropped;
+      const auto it = dropped.find(cause);
+      return it == dropped.end() ? std::uint64_t{0} : it->second;
+    };
+    out[name_of(sensor)] = {{"messages", h.messages},
+                            {"rate_hz", h.mean_interval > 0 ? tenths(1 / h.mean_interval) : 0},
+                            {"jitter_ms", tenths(1e3 * h.jitter)},
+                            {"longest_gap_s", h.longest_gap},
+                            {"duplicates", count("duplicate")},
+                            {"repeated", h.repeated},
+                            {"frozen", h.frozen},
+                            {"not_finite", count("not finite")},
+                            {"clipped", h.clipped},
+                            {"off_clock", h.off_clock},
+                            {"clock_offset_s", h.clock_offset},
+                            {"lag_s", h.mean_lag}};
+  }
+  return out;
+}
+
+Json recovery_json(const Statistics& statistics) {
+  return {{"imu_outages", statistics.imu_outages},
+          {"searches", statistics.searches},
+          {"found", statistics.found},
+          {"maps_begun_anew", statistics.maps_begun_anew}};
+}
+
 Json points_json(const RunFacts& facts, const lab::RecordingSource& source, const Statistics& statistics) {
   const PointDrops& drops = statistics.points;
   Json out{{"non_finite", drops.non_finite},
@@ -89,6 +122,9 @@ std::string summary_json(const RunFacts& facts, const lab::Settings& settings, c
   json["diverged"] = statistics.diverged || !recap.absurdity().empty();
   json["input_damaged"] = source.input_damaged();
   json["messages"] = messages_json(facts, source, statistics);
+  json["health"] = health_json(facts, statistics);
+  json["recovery"] = recovery_json(statistics);
+  json["degraded"] = recap.degraded;
   json["points"] = points_json(facts, source, statistics);
   json["warnings"] = all_warnings(facts, source, statistics);
   json["rollbacks"] = statistics.rollbacks;

@@ -20,34 +20,17 @@ Duration silence(double rate, double periods, Duration least) { return std::max(
 
 }  // namespace
 
-void Estimator::choose_modality(Time t) {
-  const bool lidar = uses(Sensor::lidar) && t - last_sweep_ <= silence(robot_.lidar.rate, 3, std::chrono::milliseconds(300));
-  const bool legs = last_legs_.has_value();
-  // Vision needs the surfaces that the LiDAR sees.
-  const bool camera = lidar && last_image_ && t - *last_image_ <= silence(robot_.camera.rate, 3, std::chrono::milliseconds(300));
-  const Modality with_legs = lidar ? (camera ? Modality::kilv : Modality::kil) : Modality::ki;
-  const Modality without_legs = lidar ? (camera ? Modality::liv : Modality::li) : Modality::coast;
-  const Modality now = legs ? with_legs : without_legs;
-  if (now == modality_) return;
-  if (modality_ != Modality::coast || cause_ != std::string_view("start")) {
-    if (lidar != has_lidar(modality_)) {
-      cause_ = lidar ? "lidar is back" : "lidar lost";
-    } else if (legs != has_legs(modality_)) {
-      cause_ = legs ? "legs are back" : "legs lost";
-    } else {
-      cause_ = camera ? "images are used" : "camera lost";
-    }
-  }
-  modality_ = now;
-}
-
 void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   s.accel *= accel_scale_;
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::imu)].used;
   // Where the IMU was silent as well, nobody can say that the legs are lost.
   const Time heard = replay_.has_imu() ? replay_.newest_imu().t : s.t;
+  if (to_seconds(s.t - heard) > blind_gap) bridge(heard, out);
+  recovery_.imu_lost = false;
   replay_.add(s);
+  calm_.add(s);
   if (s.t < closed_.t) return;
+  if (last_legs_ && health_.is_frozen(Sensor::legs)) lose_legs(s.t);
   if (last_legs_ && heard - *last_legs_ > silence(robot_.legs.rate, 5, std::chrono::milliseconds(50))) lose_legs(s.t);
   if (!pending_.empty() && pending_.front().end <= s.t) {
     process_pending(s.t, out);
@@ -60,24 +43,12 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   keep_finite();
   if (s.t - anchor_.t > longest_replay && pending_.empty()) settle(closed_);
   choose_modality(s.t);
+  stand(s);
   // While the legs are used their samples carry the outputs, unless one is overdue.
   constexpr double overdue = 2.5;
   const bool waits =
       last_legs_ && s.t - *last_legs_ < std::max(from_seconds(overdue / robot_.legs.rate), from_seconds(overdue * leg_period_));
   if (!waits) emit(out);
-}
-
-void Estimator::lose_legs(Time t) {
-  LegStep step;
-  step.t = std::max(t, estimate_->t);
-  for (Stance& foot : step.foot) foot.ends = true;
-  replay_.add(step);
-  for (Estimate* e : {&*estimate_, &closed_}) {
-    for (std::size_t side = 0; side < 2; ++side) end_stance(*e, side);
-  }
-  stances_.restart();
-  contacts_.restart();
-  last_legs_.reset();
 }
 
 // On the legs alone a wrong velocity makes standing feet look as if they moved, so that they are not used, and nothing mends it. No flight
@@ -99,6 +70,8 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   Stopwatch watch;
   if (s.t < estimate_->t || !replay_.has_imu()) return drop(Sensor::legs, "before the state");
   if (to_seconds(s.t - replay_.newest_imu().t) > std::max(longest_held_imu, 5 / robot_.imu.rate)) return drop(Sensor::legs, "no IMU");
+  if (recovery_.imu_lost) return drop(Sensor::legs, "no IMU");
+  if (!legs_may_return(s.t)) return drop(Sensor::legs, "not calm yet");
   auto known = kinematics_->feet(s);
   if (const auto* fault = std::get_if<std::string>(&known)) return drop(Sensor::legs, *fault);
   const Feet& feet = std::get<Feet>(known);

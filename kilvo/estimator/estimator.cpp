@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 
 namespace kilvo {
@@ -11,6 +12,16 @@ namespace {
 constexpr Duration trajectory_length = std::chrono::milliseconds(500);
 // Scans and images that wait for the IMU: more than two seconds of them are not worth waiting for.
 constexpr std::size_t max_pending = 60;
+// theta_d: an acceleration so many standard deviations from its usual is an impact.
+constexpr double unusual_acceleration = 10;
+// A walking machine that is faster than this, or so uncertain, has lost itself, m/s, m.
+constexpr double absurd_speed = 30, absurd_sigma = 1e4;
+
+bool is_sane(const Estimate& e) {
+  return is_finite(e) && e.x.v.norm() < absurd_speed && e.P.diagonal().minCoeff() > -1e-12 &&
+         e.P.diagonal().segment<3>(at::p).maxCoeff() < absurd_sigma * absurd_sigma;
+}
+
 // What no sensor measures; nullptr: nothing wrong.
 const char* fault_of(const Measurement& m) {
   constexpr double absurd_gyro = 300, absurd_accel = 5000;  // rad/s, m/s^2 (or g): beyond any IMU's range
@@ -44,7 +55,9 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       workers_(config.threads),
       visual_map_(config.visual_map),
       contacts_(config.legs),
-      stances_(config.legs) {
+      stances_(config.legs),
+      health_(robot),
+      calm_(config.initial, unusual_acceleration) {
   if (!uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.leaf_size() * (1 + 1e-9))
     throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
@@ -68,6 +81,8 @@ void Estimator::push(Measurement m, std::vector<Output>& out) {
   const Sensor s = sensor_of(m);
   if (!used_[static_cast<std::size_t>(s)]) return drop(s, "not used");
   if (const char* fault = fault_of(m)) return drop(s, fault);
+  if (const char* fault = health_.judge(m)) return drop(s, fault);
+  if (health_.imu_silence() > blind_gap) lose_imu(out);
   if (const auto refused = timeline_.push(std::move(m))) return drop(s, *refused);
   for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, "time jump");
   while (auto next = timeline_.pop()) handle(*next, out);
@@ -97,6 +112,7 @@ std::vector<Output> Estimator::finish() {
   for (const Measurement& m : before_start_) drop(sensor_of(m), "before the start");
   before_start_.clear();
   warn_of_unused_sensors();
+  warn_of_streams();
   return out;
 }
 
@@ -183,7 +199,7 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
 }
 
 bool Estimator::keep_finite() {
-  if (is_finite(*estimate_)) return true;
+  if (is_sane(*estimate_)) return true;
   // Back to the last good state; where the robot went since, nobody knows.
   const Time t = estimate_->t;
   anchor_.t = t;
@@ -222,6 +238,7 @@ Output Estimator::output_now() {
     o.is_image = true;
     o.stages.visual_us = images_.front().stages.visual_us;
     o.coloured = std::move(images_.front().coloured);
+    std::ranges::copy(images_.front().indicators, std::back_inserter(o.indicators));
     images_.pop_front();
   }
   o.t = estimate_->t;

@@ -11,6 +11,8 @@
 #include "kilvo/estimator/initialise.hpp"
 #include "kilvo/estimator/map_error.hpp"
 #include "kilvo/estimator/output.hpp"
+#include "kilvo/estimator/recovery.hpp"
+#include "kilvo/estimator/relocate.hpp"
 #include "kilvo/estimator/replay.hpp"
 #include "kilvo/estimator/timeline.hpp"
 #include "kilvo/filter/trajectory.hpp"
@@ -66,9 +68,20 @@ class Estimator {
   // asynchronous.cpp: IMU and legs
   void handle_imu(ImuSample s, std::vector<Output>& out);
   void handle_legs(const JointSample& s, std::vector<Output>& out);
-  void lose_legs(Time t);
   void keep_a_foothold(const LegStep& step, const std::array<bool, 2>& passed);
+
+  // switching.cpp: which sensors are used, and how they come back
   void choose_modality(Time t);
+  void lose_imu(std::vector<Output>& out);
+  void bridge(Time silent_since, std::vector<Output>& out);
+  void lose_legs(Time t);
+  bool legs_may_return(Time t);
+  void stand(const ImuSample& s);  // without any other sense, a robot that stands has no velocity
+  bool register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters, const PoseCovariance& within_scan);
+  bool may_learn(const Estimate& prior, const RegistrationReport& report);
+  void refuse_sweep(Time t);
+  void note_outage(Time sweep_begin);
+  void warn_of_streams();
 
   // sequential.cpp: sweeps
   void process_pending(Time until, std::vector<Output>& out);
@@ -133,6 +146,9 @@ class Estimator {
   std::optional<Time> last_image_;  // that was used
   Modality modality_ = Modality::coast;
   const char* cause_ = "start";
+  Health health_;
+  Calm calm_;
+  Recovery recovery_;
   Statistics statistics_;
 };
 

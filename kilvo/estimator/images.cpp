@@ -44,6 +44,7 @@ const char* Estimator::image_fault(const CameraImage& image) {
 
 void Estimator::process(const CameraImage& image) {
   if (image.t < anchor_.t) return drop(Sensor::camera, "before the state");
+  if (replay_.is_blind(image.t, image.t)) return drop(Sensor::camera, "no IMU");
   if (seen_W_.empty()) return drop(Sensor::camera, "before the first sweep");
   Stopwatch watch;
   const std::vector<GreyImage> pyramid = pyramid_of(to_grey(image.image), Patch::levels);
@@ -77,6 +78,7 @@ void Estimator::process(const CameraImage& image) {
   last_image_ = image.t;
   Output& seen = images_.emplace_back();
   seen.coloured = colours_of(image.image, estimate_->x.tau, *camera_, T_CI_ * estimate_->x.pose().inverse(), depth);
+  seen.indicators = indicators_of(model.report().used);
   seen.stages.visual_us = watch.lap_us();
 }
 

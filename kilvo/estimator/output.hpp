@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "kilvo/estimator/degradation.hpp"
+#include "kilvo/estimator/health.hpp"
 #include "kilvo/estimator/modality.hpp"
 #include "kilvo/filter/state.hpp"
 #include "kilvo/legs/contact_estimator.hpp"
@@ -37,6 +39,7 @@ struct Output {
   double kinematic_us = 0;           // of a leg sample: kinematics, contacts, prediction and update
   double contact_us = 0;             // the contacts' part of it
   StageTimes stages;                 // of a sweep, of an image
+  std::vector<Indicator> indicators;  // of a sweep, of an image
   // Only of sweeps:
   std::vector<PointXYZI> points_W;  // undistorted, in the world
   RegistrationReport registration;
@@ -56,6 +59,10 @@ struct Statistics {
   std::uint64_t lost_stances = 0;                 // on the legs alone no foot was found for so long that the velocity was given up
   std::uint64_t unsupported = 0;                  // leg samples in which no foot stood, or stood still enough to be used
   std::uint64_t rollbacks = 0;                    // a non-finite state was thrown away
+  std::array<StreamHealth, sensor_count> health;  // by Sensor
+  std::uint64_t imu_outages = 0;                  // the IMU was silent for so long that the pose was unknown
+  std::uint64_t searches = 0, found = 0;          // sweeps whose pose was searched for, and found
+  std::uint64_t maps_begun_anew = 0;              // because sweeps had fitted nowhere for long
   bool diverged = false;
   std::vector<std::string> warnings;  // each said once
 };

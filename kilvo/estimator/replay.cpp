@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "kilvo/estimator/health.hpp"
+#include "kilvo/estimator/recovery.hpp"
 #include "kilvo/filter/update.hpp"
 
 namespace kilvo {
@@ -19,18 +21,40 @@ void Replay::add(const ImuSample& s) {
   imu_.push_back(s);
 }
 
+// Beyond the end of its range an IMU may have seen anything of the same size.
+void Replay::say_clipped(ImuInterval& interval) const {
+  constexpr double gyro = 3, accel = 20;     // rad/s, m/s^2: what may be missing
+  constexpr double correlation = 0.01;       // s: it stays missing for so long
+  interval.gyro_scale = gyro * gyro * correlation / (config_.noise.gyro * config_.noise.gyro);
+  interval.accel_scale = accel * accel * correlation / (config_.noise.accel * config_.noise.accel);
+}
+
+bool Replay::is_blind(Time begin, Time end) const {
+  auto next = std::upper_bound(imu_.begin(), imu_.end(), begin, [](Time t, const ImuSample& s) { return t < s.t; });
+  for (; next != imu_.end(); ++next) {
+    if (next != imu_.begin() && to_seconds(next->t - (next - 1)->t) > blind_gap) return true;
+    if (next->t >= end) return false;
+  }
+  return false;
+}
+
 // The closed interval [begin, end] between two samples; when nobody saw the motion in between, with noise that says so.
 ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const {
   ImuInterval interval = ImuInterval::between(a, b, begin, end);
   const double gap = to_seconds(b.t - a.t);
-  if (gap <= config_.max_imu_gap) return interval;
+  if (gap <= config_.max_imu_gap) {
+    if (is_clipped(a, b)) say_clipped(interval);
+    return interval;
+  }
   // What was missed is about what varied before, constant over the gap: as a density, times the gap.
   constexpr double least_gyro = 0.02, least_accel = 0.2;  // rad/s, m/s^2
   const double gyro2 = gyro_variance_.sum() + least_gyro * least_gyro, accel2 = accel_variance_.sum() + least_accel * least_accel;
   interval.gyro_scale = gyro2 * gap / (config_.noise.gyro * config_.noise.gyro);
   interval.accel_scale = accel2 * gap / (config_.noise.accel * config_.noise.accel);
-  constexpr double blind = 1.0;  // s; after longer than this the two samples say nothing of the time between
-  if (gap > blind) {
+  constexpr double told_by_its_ends = 0.25;  // s
+  if (gap > told_by_its_ends) {
+    // The two samples say nothing of the time between: what a walking robot may have done is added after the prediction (widen).
+    interval.gyro_scale = interval.accel_scale = 1;
     interval.gyro_begin = interval.gyro_end = x.bg;
     interval.accel_begin = interval.accel_end = x.ba - x.R.inverse() * x.g;
   }
@@ -59,7 +83,10 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   auto next = std::upper_bound(imu_.begin(), imu_.end(), e.t, [](Time t, const ImuSample& s) { return t < s.t; });
   for (; e.t < until && next != imu_.end(); ++next) {
     const ImuSample& a = next == imu_.begin() ? *next : *(next - 1);
-    step(interval_between(a, *next, e.t, std::min(until, next->t), e.x));
+    const Time begin = e.t;
+    const double gap = to_seconds(next->t - a.t);
+    step(interval_between(a, *next, begin, std::min(until, next->t), e.x));
+    if (gap > blind_gap) widen(e, begin, e.t, gap);
   }
   if (e.t >= until) return;
   ImuSample held = imu_.back();

@@ -19,6 +19,9 @@ class Replay {
   void add(const ImuSample& s);
   void add(const LegStep& s) { steps_.push_back(s); }
 
+  /// The IMU was silent within [begin, end], for so long that nothing is known of the motion.
+  bool is_blind(Time begin, Time end) const;
+
   bool has_imu() const { return !imu_.empty(); }
   const ImuSample& newest_imu() const { return imu_.back(); }
 
@@ -37,6 +40,7 @@ class Replay {
   void clear_steps() { steps_.clear(); }
 
  private:
+  void say_clipped(ImuInterval& interval) const;
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
   std::optional<Eigen::Vector3d> gyro_at(Time t) const;  // none within a gap
   FootOrientations standing_at(Time t) const;

@@ -69,6 +69,8 @@ bool Estimator::waits_for_scan(Time image, Time until) const {
 
 void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& out) {
   if (end < anchor_.t) return drop(Sensor::lidar, "before the state");
+  if (replay_.is_blind(begin_of(scan), end)) return drop(Sensor::lidar, "no IMU");
+  note_outage(begin_of(scan));
   Stopwatch watch;
   // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
   // the sweep cancels to first order. What came since is replayed.
@@ -86,13 +88,11 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   if (!weak_.isZero(0)) lidar.weak_share *= to_leave;
   LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar, workers_);
   const PoseCovariance within_scan = undistortion_noise(config_.noise, end - centre);
-  const auto measured = [&](const State& x, const Covariance& P) {
-    Information<6> info = model(x, P);
-    add_common_noise(within_scan, info);
-    return info;
-  };
   const bool first = map_.empty();
-  estimate_ = first ? prior : update(prior, measured, config_.update).posterior;
+  if (!register_sweep(prior, model, clusters, within_scan)) {
+    refuse_sweep(end);
+    return replay_.advance(*estimate_, end, trajectory_);
+  }
   const bool good = keep_finite();
   StageTimes stages;
   stages.lidar_us = watch.lap_us();
@@ -101,7 +101,8 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   if (good) {
     trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
     weak_ = weak_part(model.report().degeneracy);
-    if (!map_is_given_) learn(model, clusters);
+    const bool sure = may_learn(prior, model.report());
+    if (!map_is_given_ && sure) learn(model, clusters);
     settle(*estimate_);
   }
   stages.map_us = watch.lap_us();
@@ -109,11 +110,12 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   replay_.advance(*estimate_, end, trajectory_);
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::lidar)].used;
   statistics_.diverged = statistics_.diverged || estimate_->x.v.norm() > absurd_speed;
-  if (first || model.report().matched > 0) last_sweep_ = end;
+  if (first || says_enough(model.report())) last_sweep_ = end;
   choose_modality(end);
   Output& sweep = sweeps_.emplace_back();
   sweep.is_sweep = true;
   sweep.registration = model.report();
+  sweep.indicators = indicators_of(points, model.report());
   sweep.points_W = in_world(points, T_WI);
   if (uses(Sensor::camera)) seen_W_ = sweep.points_W;
   last_middle_ = centre;

@@ -1,0 +1,45 @@
+#include "kilvo/estimator/degradation.hpp"
+
+#include <Eigen/Eigenvalues>
+
+namespace kilvo {
+namespace {
+
+// A third each would be a sweep that knows all directions equally well.
+constexpr double least_share = 0.005;
+// A cloud that is a sheet or a line; the information speaks for itself, so this alone degrades only what is next to flat.
+constexpr double least_ratio = 1e-4;
+constexpr int fewest_visual_points = 20;
+// Fewer rows, or more directions than these that they do not hold: not worth the name of a registration.
+constexpr int fewest_rows = 30, most_weak = 3;
+
+}  // namespace
+
+double eigenvalue_ratio(std::span<const PointXYZI> points) {
+  if (points.size() < 4) return 0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  for (const PointXYZI& p : points) {
+    const Eigen::Vector3d x = p.head<3>().cast<double>();
+    sum += x;
+    squares += x * x.transpose();
+  }
+  const double n = static_cast<double>(points.size());
+  const Eigen::Matrix3d scatter = squares / n - (sum / n) * (sum / n).transpose();
+  const Eigen::Vector3d l = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter, Eigen::EigenvaluesOnly).eigenvalues();
+  return l[2] > 0 ? std::max(0.0, l[0]) / l[2] : 0;
+}
+
+std::vector<Indicator> indicators_of(std::span<const PointXYZI> points, const RegistrationReport& report) {
+  const double ratio = eigenvalue_ratio(points), share = report.degeneracy.smallest_share;
+  return {{"lidar_ratio", ratio, ratio < least_ratio},
+          {"lidar_share", share, report.matched > 0 && (report.degeneracy.weak_count > 0 || share < least_share)}};
+}
+
+std::vector<Indicator> indicators_of(int visual_points) {
+  return {{"visual_points", static_cast<double>(visual_points), visual_points < fewest_visual_points}};
+}
+
+bool says_enough(const RegistrationReport& report) { return report.matched >= fewest_rows && report.degeneracy.weak_count <= most_weak; }
+
+}  // namespace kilvo

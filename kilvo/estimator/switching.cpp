@@ -1,0 +1,223 @@
+// Which sensors are used, and how they come back: all decisions on modality are here.
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <string_view>
+
+#include "kilvo/estimator/estimator.hpp"
+#include "kilvo/filter/update.hpp"
+
+namespace kilvo {
+namespace {
+
+// theta_s of Eq. 16: a sensor that has been silent for longer is lost.
+Duration silence(double rate, double periods, Duration least) { return std::max(least, from_seconds(periods / rate)); }
+
+// After an outage so many sweeps in a row must agree with what was expected before the map grows again.
+constexpr int consistent_sweeps = 3;
+// Sweeps that fitted nowhere for so long: the robot is where the map is not.
+constexpr Duration longest_refusal = std::chrono::seconds(2);
+
+std::string milliseconds_of(double seconds) { return std::to_string(std::lround(1e3 * seconds)) + " ms"; }
+
+}  // namespace
+
+void Estimator::choose_modality(Time t) {
+  const bool lidar = uses(Sensor::lidar) && t - last_sweep_ <= silence(robot_.lidar.rate, 3, std::chrono::milliseconds(300));
+  const bool legs = last_legs_.has_value();
+  // Vision needs the surfaces that the LiDAR sees.
+  const bool camera = lidar && last_image_ && t - *last_image_ <= silence(robot_.camera.rate, 3, std::chrono::milliseconds(300));
+  const Modality with_legs = lidar ? (camera ? Modality::kilv : Modality::kil) : Modality::ki;
+  const Modality without_legs = lidar ? (camera ? Modality::liv : Modality::li) : Modality::coast;
+  const Modality now = legs ? with_legs : without_legs;
+  const bool after_outage = std::string_view(cause_).starts_with("imu ") && cause_ != std::string_view("imu is back");
+  if (after_outage) cause_ = "imu is back";
+  if (now == modality_) return;
+  if (!after_outage && (modality_ != Modality::coast || cause_ != std::string_view("start"))) {
+    if (lidar != has_lidar(modality_)) {
+      cause_ = lidar ? "lidar is back" : health_.is_frozen(Sensor::lidar) ? "lidar frozen" : "lidar lost";
+    } else if (legs != has_legs(modality_)) {
+      cause_ = legs ? "legs are back" : health_.is_frozen(Sensor::legs) ? "legs frozen" : "legs lost";
+    } else {
+      cause_ = camera ? "images are used" : health_.is_frozen(Sensor::camera) ? "camera frozen" : "camera lost";
+    }
+  }
+  modality_ = now;
+}
+
+// Said at once, on the last output's heels; from then on there is no pose.
+void Estimator::lose_imu(std::vector<Output>& out) {
+  if (!estimate_ || recovery_.imu_lost) return;
+  recovery_.imu_lost = true;
+  ++statistics_.imu_outages;
+  modality_ = Modality::coast;
+  cause_ = health_.is_frozen(Sensor::imu) ? "imu frozen" : "imu lost";
+  const Estimate kept = *estimate_;
+  widen(*estimate_, kept.t, kept.t + from_seconds(blind_gap), blind_gap);
+  estimate_->t = std::max(kept.t, last_output_.value_or(kept.t) + Duration(1000));
+  emit(out);
+  estimate_ = kept;
+}
+
+// The IMU is back. Feet may have been lifted and set down in between; the velocity is anything that a walking robot's may be.
+void Estimator::bridge(Time silent_since, std::vector<Output>& out) {
+  lose_imu(out);
+  recovery_.imu_lost = false;
+  recovery_.sweeps_to_go = consistent_sweeps;
+  calm_.restart();
+  if (last_legs_) lose_legs(silent_since);
+}
+
+void Estimator::lose_legs(Time t) {
+  LegStep step;
+  step.t = std::max(t, estimate_->t);
+  for (Stance& foot : step.foot) foot.ends = true;
+  replay_.add(step);
+  for (Estimate* e : {&*estimate_, &closed_}) {
+    for (std::size_t side = 0; side < 2; ++side) end_stance(*e, side);
+  }
+  stances_.restart();
+  contacts_.restart();
+  recovery_.legs_were_there = statistics_.sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
+  recovery_.legs_waiting.reset();
+  last_legs_.reset();
+}
+
+// Legs that come again in the middle of an impact would start with wrong contacts (paper, Section IV-E). Which foot stands is told by what
+// is still: that needs a velocity.
+bool Estimator::legs_may_return(Time t) {
+  if (last_legs_ || !recovery_.legs_were_there) return true;
+  constexpr Duration longest_wait = std::chrono::seconds(1), calm = std::chrono::milliseconds(20);
+  constexpr double known_velocity = 0.15;  // m/s
+  if (!recovery_.legs_waiting) recovery_.legs_waiting = t;
+  const double sigma_v = std::sqrt(std::max(0.0, estimate_->P.block<3, 3>(at::v, at::v).trace() / 3));
+  if (health_.is_frozen(Sensor::legs)) return false;
+  // Sweeps, if there are any, tell the velocity soon.
+  const auto heard = health_.heard(Sensor::lidar);
+  const bool sweeps = heard && t - *heard < silence(robot_.lidar.rate, 4, std::chrono::milliseconds(300));
+  const bool ready = calm_.is_usual(t, calm) && (sigma_v < known_velocity || !sweeps);
+  if (!ready && t - *recovery_.legs_waiting < longest_wait) return false;
+  recovery_.legs_waiting.reset();
+  last_stance_ = t;
+  return true;
+}
+
+// Nothing else measures, and the IMU looks like that of a robot at rest: it does not move, and up is where the accelerometer says.
+void Estimator::stand(const ImuSample& s) {
+  constexpr Duration period = std::chrono::milliseconds(100);
+  constexpr double velocity_sigma = 0.01, accel_sigma = 0.2;  // m/s, m/s^2
+  if (modality_ != Modality::coast || !calm_.stands() || !pending_.empty()) return;
+  if (recovery_.last_standing && s.t - *recovery_.last_standing < period) return;
+  recovery_.last_standing = s.t;
+  const auto at_rest = [&s](const State& x, const Covariance&) {
+    const Eigen::Vector3d down_I = x.R.inverse() * x.g;
+    Rows<6> rows;
+    rows.r.resize(6);
+    rows.r << x.v, x.ba - down_I - s.accel;
+    rows.H.setZero(6, at::size);
+    rows.H.block<3, 3>(0, at::v).setIdentity();
+    rows.H.block<3, 3>(3, at::R) = -skew(down_I);
+    rows.H.block<3, 3>(3, at::ba).setIdentity();
+    rows.H.block<3, 3>(3, at::g) = -x.R.matrix().transpose();
+    rows.R.setZero(6, 6);
+    rows.R.diagonal().head<3>().array() = velocity_sigma * velocity_sigma;
+    rows.R.diagonal().tail<3>().array() = accel_sigma * accel_sigma;
+    return rows;
+  };
+  closed_ = update(closed_, at_rest, config_.update).posterior;
+  estimate_ = closed_;
+  if (keep_finite()) settle(closed_);
+}
+
+// False: the sweep fits nowhere, and says nothing of the state.
+bool Estimator::register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters,
+                               const PoseCovariance& within_scan) {
+  estimate_ = prior;
+  if (map_.empty()) return true;
+  if (!needs_search(prior.P, PoseCovariance::Identity() - weak_)) {
+    UpdateConfig patient = config_.update;
+    if (recovery_.sweeps_to_go > 0) patient.max_iterations *= 3;
+    const auto measured = [&](const State& x, const Covariance& P) {
+      Information<6> info = model(x, P);
+      add_common_noise(within_scan, info);
+      return info;
+    };
+    estimate_ = update(prior, measured, patient).posterior;
+    return true;
+  }
+  ++statistics_.searches;
+  const auto found = find_pose(map_, clusters, robot_.lidar.T_imu_lidar.p, prior, config_.lidar, workers_);
+  if (!found) return false;
+  ++statistics_.found;
+  recovery_.sweeps_to_go = consistent_sweeps;
+  // The scan was undistorted with a velocity and a tilt that were guesses.
+  constexpr double half_scan = 0.05, found_rotation = 0.006, found_position = 0.005;  // s, rad, m
+  const double sigma_v2 = prior.P.diagonal().segment<3>(at::v).maxCoeff();
+  PoseCovariance guessed = within_scan;
+  guessed.diagonal().head<3>().array() += found_rotation * found_rotation;
+  guessed.diagonal().tail<3>().array() += found_position * found_position + 0.25 * half_scan * half_scan * sigma_v2;
+  const auto measured = [&](const State& x, const Covariance&) {
+    Information<6> info = information_at(*found, x);
+    add_common_noise(guessed, info);
+    return info;
+  };
+  estimate_ = update(prior, measured, config_.update).posterior;
+  model(estimate_->x, estimate_->P);
+  return true;
+}
+
+// A sweep that fits nowhere is not used; when that has lasted, the robot is taken to be outside of the map: it begins anew around it.
+void Estimator::refuse_sweep(Time t) {
+  drop(Sensor::lidar, "fits nowhere in the map");
+  if (!recovery_.refused_since) recovery_.refused_since = t;
+  recovery_.sweeps_to_go = consistent_sweeps;
+  if (map_is_given_ || t - *recovery_.refused_since < longest_refusal) return;
+  map_ = VoxelMap(config_.map);
+  visual_map_ = VisualMap(config_.visual_map);
+  weak_.setZero();
+  recovery_.refused_since.reset();
+  recovery_.sweeps_to_go = 0;
+  ++statistics_.maps_begun_anew;
+}
+
+// After an outage the map is re-joined, not smeared: it grows again when sweeps have agreed with the prediction some times, or where it has
+// not been before.
+bool Estimator::may_learn(const Estimate& prior, const RegistrationReport& report) {
+  recovery_.refused_since.reset();
+  if (recovery_.sweeps_to_go == 0) return true;
+  constexpr double known_share = 0.2, agreeing_share = 0.6, six_at_99_9 = 22.46;
+  const int met = report.matched + report.rejected;
+  if (met < known_share * report.clusters) return true;
+  PoseCovariance P = prior.P.topLeftCorner<6, 6>() + map_error_.at(prior.x.pose());
+  P.diagonal().array() += 1e-6;
+  const Eigen::Matrix<double, 6, 1> change = boxminus(estimate_->x, prior.x).head<6>();
+  const bool consistent = report.matched > agreeing_share * met && change.dot(P.ldlt().solve(change)) < six_at_99_9;
+  recovery_.sweeps_to_go = consistent ? recovery_.sweeps_to_go - 1 : consistent_sweeps;
+  return recovery_.sweeps_to_go == 0;
+}
+
+void Estimator::note_outage(Time sweep_begin) {
+  constexpr int periods = 4;
+  if (last_middle_ != Time{} && sweep_begin - last_sweep_ > from_seconds(periods / robot_.lidar.rate))
+    recovery_.sweeps_to_go = std::max(recovery_.sweeps_to_go, consistent_sweeps);
+}
+
+// What the streams themselves showed; what could not be used is said elsewhere.
+void Estimator::warn_of_streams() {
+  statistics_.health = health_.streams();
+  const auto say = [this](std::size_t s, const std::string& text) {
+    statistics_.warnings.push_back(std::string(name_of(static_cast<Sensor>(s))) + ": " + text);
+  };
+  for (std::size_t s = 0; s < sensor_count; ++s) {
+    const StreamHealth& stream = statistics_.health[s];
+    if (stream.off_clock > 4) {
+      say(s, "its clock is " + milliseconds_of(stream.clock_offset) + " ahead of the IMU's: " + std::to_string(stream.off_clock) +
+                 " messages were not used");
+    }
+    constexpr double late = 0.25;  // s
+    if (stream.mean_lag > late) say(s, "its messages come " + milliseconds_of(stream.mean_lag) + " after the IMU's of the same time");
+    if (stream.frozen > 0) say(s, "frozen " + std::to_string(stream.frozen) + " times: it kept saying the same");
+  }
+}
+
+}  // namespace kilvo

@@ -1,0 +1,152 @@
+// A simulated walk, its sensors failing, and how wrong the estimate becomes: in metres, and in units of what it says of itself.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "kilvo/estimator/estimator.hpp"
+#include "lab/settings/settings.hpp"
+#include "lab/simulation/description.hpp"
+#include "lab/simulation/failures.hpp"
+#include "tests/helpers/simulated.hpp"
+
+namespace kilvo::test {
+
+/// Measurements that were recorded, with the times of their arrival.
+class Recorded final : public MeasurementSource {
+ public:
+  Recorded(const std::vector<std::pair<Time, Measurement>>& all) : all_(all) {}
+  std::optional<Measurement> next() override {
+    if (index_ == all_.size()) return std::nullopt;
+    return all_[index_++].second;
+  }
+  Time arrived() const { return all_[index_ - 1].first; }
+
+ private:
+  const std::vector<std::pair<Time, Measurement>>& all_;
+  std::size_t index_ = 0;
+};
+
+struct Moment {
+  double s = 0;  // since the beginning of the walk
+  double error = 0, sigma = 0, sigmas = 0, tilt_sigmas = 0;
+  double step = 0;  // how far the estimate moved beyond the truth since the moment before, m
+  Modality modality{};
+  std::string cause;
+};
+
+struct Outcome {
+  std::vector<Moment> moments;  // of each output
+  Statistics statistics;
+  bool finite = true, ordered = true;
+
+  double worst(double Moment::*part, double from, double until) const {
+    double out = 0;
+    for (const Moment& m : moments) {
+      if (m.s >= from && m.s < until) out = std::max(out, m.*part);
+    }
+    return out;
+  }
+  std::vector<std::string> changes() const {
+    std::vector<std::string> out;
+    for (std::size_t i = 0; i < moments.size(); ++i) {
+      if (i == 0 || moments[i].modality != moments[i - 1].modality) out.push_back(name_of(moments[i].modality));
+    }
+    return out;
+  }
+  double when_worst(double Moment::*part, double from, double until) const {
+    double out = 0, worst = 0;
+    for (const Moment& m : moments) {
+      if (m.s >= from && m.s < until && m.*part > worst) {
+        worst = m.*part;
+        out = m.s;
+      }
+    }
+    return out;
+  }
+  bool has_cause(const std::string& cause) const {
+    return std::ranges::any_of(moments, [&](const Moment& m) { return m.cause == cause; });
+  }
+  Modality modality_at(double s) const {
+    Modality out{};
+    for (const Moment& m : moments) {
+      if (m.s <= s) out = m.modality;
+    }
+    return out;
+  }
+};
+
+class FailingWalk {
+ public:
+  FailingWalk(const std::string& name, std::uint64_t seed, double seconds, bool camera = false) {
+    lab::SimulatorConfig config = small(seconds);
+    config.seed = seed;
+    config.lidar.points = 4000;
+    config.joints.delivery.rate = 500;
+    config.camera.width = 160;
+    config.camera.height = 120;
+    config.camera.fx = config.camera.fy = 85.3;
+    config.camera.cx = 80.3;
+    config.camera.cy = 59.5;
+    config.use[static_cast<std::size_t>(Sensor::camera)] = camera;
+    used_ = config.use;
+    simulator_ = std::make_unique<lab::Simulator>(scenario(name), config);
+    while (auto m = simulator_->next()) measurements_.emplace_back(simulator_->arrived(), *std::move(m));
+    settings_ = lab::parse_settings(lab::simulated_config(config, "sim.urdf"), "simulated", std::string(KILVO_SOURCE_DIR) + "/config/robots");
+  }
+
+  Outcome with(std::vector<lab::Failure> failures, std::optional<std::array<bool, sensor_count>> used = {}) const {
+    Recorded recorded(measurements_);
+    lab::FailingSource source(recorded, std::move(failures), simulator_->start(), [&recorded] { return recorded.arrived(); });
+    Estimator estimator(settings_.robot, settings_.estimator, used.value_or(used_));
+    Outcome out;
+    std::optional<SE3> T_WR;
+    std::optional<Time> last;
+    std::optional<Eigen::Vector3d> off;
+    const auto take = [&](const std::vector<Output>& outputs) {
+      for (const Output& o : outputs) {
+        const SE3 truth = simulator_->walk().imu(simulator_->seconds_of(o.t));
+        if (!T_WR) T_WR = o.x.pose() * truth.inverse();
+        out.ordered = out.ordered && (!last || o.t > *last);
+        out.finite = out.finite && is_finite({o.t, o.x, o.P});
+        last = o.t;
+        Moment m = moment_of(o, *T_WR * truth);
+        const Eigen::Vector3d now = o.x.p - (*T_WR * truth).p;
+        if (off) m.step = (now - *off).norm();
+        off = now;
+        m.s = simulator_->seconds_of(o.t);
+        out.moments.push_back(std::move(m));
+      }
+    };
+    while (auto m = source.next()) take(estimator.push(*std::move(m)));
+    take(estimator.finish());
+    out.statistics = estimator.statistics();
+    return out;
+  }
+
+ private:
+  static Moment moment_of(const Output& o, const SE3& truth) {
+    Moment m;
+    const Eigen::Vector3d e = o.x.p - truth.p;
+    m.error = e.norm();
+    m.sigma = std::sqrt(std::max(0.0, o.P.diagonal().segment<3>(at::p).maxCoeff()));
+    m.sigmas = (e.array().abs() / o.P.diagonal().segment<3>(at::p).array().max(1e-12).sqrt()).maxCoeff();
+    const Eigen::Vector3d r = (o.x.R.inverse() * truth.R).Log();
+    m.tilt_sigmas = (r.array().abs() / o.P.diagonal().segment<3>(at::R).array().max(1e-12).sqrt()).maxCoeff();
+    m.modality = o.modality;
+    m.cause = o.cause;
+    return m;
+  }
+
+  std::unique_ptr<lab::Simulator> simulator_;
+  std::vector<std::pair<Time, Measurement>> measurements_;
+  lab::Settings settings_;
+  std::array<bool, sensor_count> used_{};
+};
+
+}  // namespace kilvo::test

@@ -1,0 +1,146 @@
+// What each failure does to a walking robot's estimate.
+#include <cstdio>
+#include <cstdlib>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <limits>
+#include <memory>
+
+#include "tests/faults/failing_walk.hpp"
+
+namespace kilvo {
+namespace {
+
+using lab::Failure;
+using lab::FailureKind;
+using test::FailingWalk;
+using test::Moment;
+using test::Outcome;
+
+constexpr double for_ever = std::numeric_limits<double>::infinity();
+
+class Faults : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { walk_ = std::make_unique<FailingWalk>("room", 1, 14); }
+  static void TearDownTestSuite() { walk_.reset(); }
+
+  static Outcome with(std::vector<Failure> failures) {
+    Outcome out = walk_->with(std::move(failures));
+    EXPECT_TRUE(out.finite);
+    EXPECT_TRUE(out.ordered);
+    return out;
+  }
+  static void say(const char* what, const Outcome& o, double from, double until) {
+    std::printf("%-22s", what);
+    for (const std::string& c : o.changes()) std::printf(" %s", c.c_str());
+    std::printf("  error %.3f m, %.1f sigmas, sigma %.3f m, rotation %.1f sigmas (at %.2f s); at the end %.3f m; searched %d found %d anew %d\n",
+                o.worst(&Moment::error, from, until), o.worst(&Moment::sigmas, from, until), o.worst(&Moment::sigma, from, until),
+                o.worst(&Moment::tilt_sigmas, from, until), o.when_worst(&Moment::tilt_sigmas, from, until), o.moments.back().error, static_cast<int>(o.statistics.searches),
+                static_cast<int>(o.statistics.found), static_cast<int>(o.statistics.maps_begun_anew));
+  }
+
+  static std::unique_ptr<FailingWalk> walk_;
+};
+std::unique_ptr<FailingWalk> Faults::walk_;
+
+TEST_F(Faults, NothingWrongIsNothingSaid) {
+  const Outcome o = with({});
+  say("nothing", o, 0, 20);
+  EXPECT_LT(o.worst(&Moment::error, 0, 20), 0.03);
+  EXPECT_EQ(o.statistics.imu_outages, 0u);
+  EXPECT_EQ(o.statistics.searches, 0u);
+  for (const StreamHealth& h : o.statistics.health) {
+    EXPECT_EQ(h.frozen, 0u);
+    EXPECT_EQ(h.off_clock, 0u);
+    EXPECT_EQ(h.clipped, 0u);
+  }
+  EXPECT_THAT(o.statistics.warnings, testing::IsEmpty());
+}
+
+TEST_F(Faults, AnImuThatIsSilentInMidWalkIsSaidAndOutlived) {
+  for (const double length : {0.12, 0.3, 0.6, 1.5}) {
+    const Outcome o = with({{FailureKind::drop, Sensor::imu, 6, 6 + length}});
+    say(("imu " + std::to_string(length)).c_str(), o, 6, 14);
+    EXPECT_TRUE(o.has_cause("imu lost"));
+    EXPECT_TRUE(o.has_cause("imu is back"));
+    EXPECT_LT(o.worst(&Moment::sigmas, 5, 14), 4.0);
+    EXPECT_LT(o.moments.back().error, 0.05);
+    for (const Moment& m : o.moments) EXPECT_FALSE(m.s > 6.11 && m.s < 6 + length) << m.s;
+  }
+}
+
+TEST_F(Faults, WithoutLidarAnImuThatWasSilentLeavesAnHonestEstimate) {
+  const Outcome o = with({{FailureKind::drop, Sensor::lidar, 0, for_ever}, {FailureKind::drop, Sensor::imu, 6, 7.5}});
+  say("imu 1.5, legs only", o, 6, 14);
+  EXPECT_LT(o.worst(&Moment::sigmas, 5, 14), 4.0);
+}
+
+TEST_F(Faults, AllButTheImuLostForTwoSeconds) {
+  const Outcome o = with({{FailureKind::drop, Sensor::lidar, 6, 8}, {FailureKind::drop, Sensor::legs, 6, 8}});
+  say("coast 2 s", o, 6, 8.1);
+  EXPECT_EQ(o.modality_at(7), Modality::coast);
+  EXPECT_EQ(o.modality_at(9), Modality::kil);
+  EXPECT_LT(o.worst(&Moment::sigmas, 5, 14), 3.5);
+  EXPECT_LT(o.worst(&Moment::error, 9, 14), 0.03);
+}
+
+TEST_F(Faults, OneSensorLostForSixSeconds) {
+  const Outcome legs = with({{FailureKind::drop, Sensor::legs, 6, 12}});
+  say("legs 6 s", legs, 6, 14);
+  EXPECT_THAT(legs.changes(), testing::ElementsAre("KIL", "LI", "KIL"));
+  EXPECT_LT(legs.worst(&Moment::error, 6, 14), 0.03);
+  const Outcome lidar = with({{FailureKind::drop, Sensor::lidar, 6, 12}});
+  say("lidar 6 s", lidar, 6, 14);
+  EXPECT_THAT(lidar.changes(), testing::ElementsAre("KIL", "KI", "KIL"));
+  EXPECT_LT(lidar.worst(&Moment::error, 6, 14), 0.06);
+}
+
+TEST_F(Faults, FrozenSensorsAreLost) {
+  const Outcome legs = with({{FailureKind::freeze, Sensor::legs, 6, 8}});
+  say("legs frozen", legs, 6, 14);
+  EXPECT_TRUE(legs.has_cause("legs frozen"));
+  EXPECT_LT(legs.worst(&Moment::error, 6, 14), 0.03);
+  const Outcome lidar = with({{FailureKind::freeze, Sensor::lidar, 6, 8}});
+  say("lidar frozen", lidar, 6, 14);
+  EXPECT_TRUE(lidar.has_cause("lidar frozen"));
+  EXPECT_LT(lidar.worst(&Moment::error, 6, 14), 0.05);
+  const Outcome imu = with({{FailureKind::freeze, Sensor::imu, 6, 7}});
+  say("imu frozen", imu, 6, 14);
+  EXPECT_TRUE(imu.has_cause("imu frozen"));
+  EXPECT_LT(imu.worst(&Moment::sigmas, 6, 14), 4.0);
+}
+
+TEST_F(Faults, AClockAheadOfTheImuIsMeasuredAndItsSensorNotUsed) {
+  for (const Sensor sensor : {Sensor::lidar, Sensor::legs}) {
+    const Outcome o = with({{FailureKind::time_jump, sensor, 0, for_ever, 0.3}});
+    say(name_of(sensor), o, 0, 14);
+    const StreamHealth& h = o.statistics.health[static_cast<std::size_t>(sensor)];
+    EXPECT_GT(h.off_clock, 50u);
+    EXPECT_NEAR(h.clock_offset, 0.3, 0.02);
+    EXPECT_LT(o.worst(&Moment::error, 6, 14), 0.05);
+    EXPECT_THAT(o.statistics.warnings, testing::Contains(testing::HasSubstr("clock is 300 ms ahead")));
+  }
+}
+
+TEST_F(Faults, AnImuThatComesLateIsNoFaultOfTheOthers) {
+  const Outcome o = with({{FailureKind::delay, Sensor::imu, 0, for_ever, 0.3}});
+  say("imu delayed", o, 0, 14);
+  EXPECT_EQ(o.modality_at(12), Modality::kil);
+  EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.05);
+}
+
+TEST_F(Faults, ASensorThatComesLateOrNever) {
+  for (const double end : {5.0, for_ever}) {
+    for (const Sensor sensor : {Sensor::legs, Sensor::lidar}) {
+      const Outcome o = with({{FailureKind::drop, sensor, 0, end}});
+      say((std::string(name_of(sensor)) + (end > 10 ? " never" : " 5 s late")).c_str(), o, 0, 14);
+      const Modality without = sensor == Sensor::legs ? Modality::li : Modality::ki;
+      EXPECT_EQ(o.modality_at(4), without);
+      EXPECT_EQ(o.modality_at(13), end > 10 ? without : Modality::kil);
+      EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.1);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kilvo
