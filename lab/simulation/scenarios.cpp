@@ -56,7 +56,6 @@ Gait climbing() {
           .sway = 0.03,
           .bob = 0.006,
           .lean = 0.06,
-          .leaving = 0.1,
           .landing = 0.1,
           .impact = 5,
           .toe_off = 0.35};

@@ -58,7 +58,7 @@ Looks looks_through(const Eigen::Vector2d& right, const Eigen::Vector2d& down, d
   if (large < round * round * small) return {1, std::sqrt((large + small) / 2), Eigen::Vector2d::Zero()};
   // The row's variance makes up for what the circles lack.
   const double lack = std::sqrt(large - small), sigma = std::sqrt(small);
-  const int count = std::clamp(static_cast<int>(std::ceil(per_sigma * lack / sigma)), 2, most_looks);
+  const int count = std::clamp(1 + static_cast<int>(per_sigma * lack / sigma), 2, most_looks);
   const Eigen::Vector2d along = a > c ? Eigen::Vector2d((a - c) / 2 + spread, b) : Eigen::Vector2d(b, (c - a) / 2 + spread);
   return {count, sigma, rows()[static_cast<std::size_t>(count)].apart * lack * along.normalized()};
 }
