@@ -33,6 +33,7 @@ Gait fast() {
           .bob = 0.015,
           .twist = 0.08,
           .lean = 0.06,
+          .landing = 0.4,
           .impact = 8};
 }
 Gait running() {
@@ -56,7 +57,8 @@ Gait climbing() {
           .sway = 0.03,
           .bob = 0.006,
           .lean = 0.06,
-          .landing = 0.1,
+          .leaving = 0.2,
+          .landing = 0.15,
           .impact = 5,
           .toe_off = 0.35};
 }

@@ -145,7 +145,7 @@ TEST(Walk, FeetLeaveAndLandWithSpeed) {
   const Walk walk = walk_of("forward");
   const Footprint& print = walk.plan().prints[0][3];
   const auto speed = [&](double t) { return (walk.foot(Side::left, t + 1e-4).p - walk.foot(Side::left, t - 1e-4).p).z() / 2e-4; };
-  EXPECT_NEAR(speed(print.touch - 1e-3), -0.15, 0.02);
+  EXPECT_NEAR(speed(print.touch - 1e-3), -0.3, 0.02);
   EXPECT_EQ(speed(print.touch + 1e-3), 0);
   EXPECT_EQ(speed(print.lift - 1e-3), 0);
   EXPECT_LT(speed(print.lift + 1e-3), 0.02);
