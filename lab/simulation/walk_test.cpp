@@ -150,6 +150,7 @@ TEST(Walk, FeetLeaveAndLandWithSpeed) {
   EXPECT_EQ(speed(print.lift - 1e-3), 0);
   EXPECT_LT(speed(print.lift + 1e-3), 0.02);
   EXPECT_NEAR(speed(print.lift + 0.01), 0.28, 0.02);
+  EXPECT_GT((walk.foot(Side::left, print.lift + 0.007).p - walk.foot(Side::left, print.lift).p).z(), 5e-4);
 }
 
 TEST(Walk, ASlippingFootSlidesAndTheNextStepBeginsThere) {
