@@ -26,14 +26,14 @@ struct DemoOptions {
 
 void tell(const fs::path& folder, const fs::path& results, const lab::Evaluation& e, const lab::ContactEvaluation& contacts) {
   const lab::Divergence judged = lab::judge_divergence(e);
-  fmt::print("\nA humanoid (joints 1 kHz, IMU 200 Hz, LiDAR 10 Hz) walked {:.1f} m through a simulated room in {:.0f} s.\n",
+  fmt::print("\nA humanoid (joints 1 kHz, IMU 200 Hz, LiDAR and camera 10 Hz) walked {:.1f} m through a simulated room in {:.0f} s.\n",
              e.path_length_m, e.duration_s);
-  fmt::print("KILVO estimated its way from the recording alone; against the truth:\n");
+  fmt::print("KILVO estimated its way from the recording alone. {} Against the truth:\n",
+             judged.diverged ? "This is NOT as it should be." : "As it should be.");
   fmt::print("  position error      {:.1f} mm rms, {:.1f} mm at most; orientation {:.3f} degrees rms\n", 1e3 * e.ate_rmse_m,
              1e3 * e.ate_max_m, e.rotation_rmse_deg);
   fmt::print("  drift from start to end  {:.1f} mm\n", 1e3 * e.e2e_m);
   if (contacts.walks) fmt::print("  feet on the ground  {:.1f} % of the time told right, without force sensors\n", 100 * contacts.accuracy);
-  fmt::print("  {}\n", judged.diverged ? "This is NOT as it should be." : "As it should be.");
   fmt::print("Look at:\n");
   fmt::print("  {}  pictures of all of it, for a browser\n", (results / "report.html").string());
   fmt::print("  {}  the map, for MeshLab or CloudCompare\n", (results / "map.ply").string());

@@ -77,52 +77,63 @@ PixelRay CameraSensor::ray_of(int u, int v, const SO3& R_WC) const {
 }
 
 Colour CameraSensor::light_of_edge(const Eigen::Vector3d& origin, const PixelRay& ray) const {
-  Colour light = Colour::Zero();
   // A grid turned a little: along an edge in any of the usual directions each ray counts by itself.
   constexpr double c = 0.970, s = 0.243;
   const double blur = config_.camera.blur;
+  std::array<Eigen::Vector3d, World::bundle> directions;
+  static_assert(quantiles.size() * quantiles.size() == World::bundle);
+  auto next = directions.begin();
   for (const double a : quantiles) {
     for (const double b : quantiles) {
       const double x = blur * a, y = blur * b;
-      PixelRay part = ray;
-      part.direction = (ray.direction + (c * x - s * y) * ray.right + (s * x + c * y) * ray.down).normalized();
-      const auto hit = world_.cast(origin, part.direction);
-      light += hit ? world_.radiance(*hit, part, blur_of_ray * blur) : world_.sky();
+      *next++ = (ray.direction + (c * x - s * y) * ray.right + (s * x + c * y) * ray.down).normalized();
     }
   }
-  return light / static_cast<float>(quantiles.size() * quantiles.size());
+  const auto hits = world_.cast(origin, directions);
+  Colour light = Colour::Zero();
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    light += hits[i] ? world_.radiance(*hits[i], {directions[i], ray.right, ray.down}, blur_of_ray * blur) : world_.sky();
+  }
+  return light / static_cast<float>(World::bundle);
 }
 
 // Adds what the rows of pixels from `first_row` to before `last_row` see.
 void CameraSensor::add_light(const SE3& T_WC, int first_row, int last_row, std::vector<Colour>& light) const {
   constexpr std::size_t sky = ~std::size_t{0};
-  const int width = config_.camera.width, columns = width + 2;
+  const int width = config_.camera.width;
+  const auto columns = static_cast<std::size_t>(width) + 2;
   std::vector<std::size_t> seen;  // surfaces, of one pixel more on each side
   std::vector<std::optional<Hit>> hits;
   for (int v = first_row - 1; v <= last_row; ++v) {
-    for (int u = -1; u <= width; ++u) {
-      const auto& direction =
-          directions_[static_cast<std::size_t>(v + 1) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(u + 1)];
-      hits.push_back(world_.cast(T_WC.p, (T_WC.R * direction.cast<double>()).normalized()));
-      seen.push_back(hits.back() ? hits.back()->surface : sky);
+    const Eigen::Vector3f* row = &directions_[static_cast<std::size_t>(v + 1) * columns];
+    for (std::size_t first = 0; first < columns; first += World::bundle) {
+      std::array<Eigen::Vector3d, World::bundle> directions;
+      for (std::size_t k = 0; k < World::bundle; ++k)
+        directions[k] = (T_WC.R * row[std::min(first + k, columns - 1)].cast<double>()).normalized();
+      const auto bundle = world_.cast(T_WC.p, directions);
+      hits.insert(hits.end(), bundle.begin(), bundle.begin() + static_cast<std::ptrdiff_t>(std::min(World::bundle, columns - first)));
     }
   }
+  for (const auto& hit : hits) seen.push_back(hit ? hit->surface : sky);
   const auto is_edge = [&](std::size_t i) {
-    const auto step = static_cast<std::size_t>(columns);
-    for (const std::size_t row : {i - step, i, i + step}) {
+    for (const std::size_t row : {i - columns, i, i + columns}) {
       if (seen[row - 1] != seen[i] || seen[row] != seen[i] || seen[row + 1] != seen[i]) return true;
     }
     return false;
   };
+  // Half of what lies between two pixels' places on the surface that both see.
+  const auto between = [&](std::size_t a, std::size_t b) {
+    return Eigen::Vector2d((hits[b]->u - hits[a]->u) / 2, (hits[b]->v - hits[a]->v) / 2);
+  };
+  const auto light_at = [&](int u, int v, std::size_t i) -> Colour {
+    if (is_edge(i)) return light_of_edge(T_WC.p, ray_of(u, v, T_WC.R));
+    if (!hits[i]) return world_.sky();
+    return world_.radiance(*hits[i], between(i - 1, i + 1), between(i - columns, i + columns), config_.camera.blur);
+  };
+  auto out = light.begin();
   for (int v = first_row; v < last_row; ++v) {
-    for (int u = 0; u < width; ++u) {
-      const auto i = static_cast<std::size_t>(v - first_row + 1) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(u + 1);
-      const PixelRay ray = ray_of(u, v, T_WC.R);
-      light[static_cast<std::size_t>(v - first_row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u)] +=
-          is_edge(i) ? light_of_edge(T_WC.p, ray)
-          : hits[i]  ? world_.radiance(*hits[i], ray, config_.camera.blur)
-                     : world_.sky();
-    }
+    std::size_t i = static_cast<std::size_t>(v - first_row + 1) * columns;
+    for (int u = 0; u < width; ++u) *out++ += light_at(u, v, ++i);
   }
 }
 
@@ -152,7 +163,7 @@ Image CameraSensor::image(std::int64_t index, double t, const std::function<SE3(
   const auto width = static_cast<std::size_t>(m.width), height = static_cast<std::size_t>(m.height);
 
   Image out{m.width, m.height, 3, std::vector<std::uint8_t>(width * height * 3)};
-  constexpr std::size_t rows = 24;
+  constexpr std::size_t rows = 48;
   workers.sum(height, rows, NoSum{}, [&](std::size_t first, std::size_t last) {
     std::vector<Colour> light((last - first) * width, Colour::Zero());
     for (const SE3& T : poses) add_light(T, static_cast<int>(first), static_cast<int>(last), light);

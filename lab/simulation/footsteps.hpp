@@ -18,8 +18,8 @@ struct Gait {
   double hip_height = 0.555;               // over the ankles
   double sway = 0.03, bob = 0.012;         // of the pelvis, sideways with the stance foot and up in the middle of each step
   double roll = 0.02, pitch = 0.015, twist = 0.05, lean = 0.03;
-  double leaving = 0.15;                // speed at which a foot leaves the ground
-  double landing = 0.15;                // and at which it comes down
+  double leaving = 0.3;                 // speed that a foot has soon after it left the ground
+  double landing = 0.3;                 // and at which it comes down
   double impact = 4;                    // the torso rings so hard at each touchdown
   double heel_strike = 0, toe_off = 0;  // the sole comes down on its heel, leaves over its toe
   double slip = 0, slip_time = 0.15;    // each stance of the left foot slides forward so far in so long

@@ -33,6 +33,8 @@ Gait fast() {
           .bob = 0.015,
           .twist = 0.08,
           .lean = 0.06,
+          .leaving = 0.4,
+          .landing = 0.4,
           .impact = 8};
 }
 Gait running() {
@@ -51,15 +53,15 @@ Gait running() {
 Gait climbing() {
   return {.period = 0.7,
           .double_support = 0.16,
-          .lift = 0.04,
+          .lift = 0.03,
           .hip_height = 0.515,
           .sway = 0.03,
           .bob = 0.006,
           .lean = 0.06,
-          .leaving = 0.1,
-          .landing = 0.1,
+          .leaving = 0.28,
+          .landing = 0.3,
           .impact = 5,
-          .toe_off = 0.35};
+          .toe_off = 0.3};
 }
 Gait descending() {
   Gait gait = climbing();

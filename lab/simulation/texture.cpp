@@ -1,7 +1,8 @@
 #include "lab/simulation/texture.hpp"
 
-#include <Eigen/Core>
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 
 #include "lab/simulation/random.hpp"
@@ -20,12 +21,6 @@ using Grid = std::vector<float>;
 // Of a texel, or of a cell of n in a row.
 std::size_t index_of(int x, int y, int n = size) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(n) + static_cast<std::size_t>(x);
-}
-
-// std::floor for what fits an int64; on plain x86-64 that is a call into the library, and every pixel asks many times.
-double whole(double x) {
-  const auto i = static_cast<double>(static_cast<std::int64_t>(x));
-  return i > x ? i - 1 : i;
 }
 
 // Smooth noise that repeats with the texture: random values every `cell` texels, interpolated.
@@ -90,12 +85,12 @@ Grid paint(Pattern pattern, std::uint64_t seed) {
   return grid;
 }
 
-// The columns before the first and after the last are there twice, so that a spline finds its four in a row.
-Grid with_wrapped_columns(const Grid& grid, std::size_t n) {
+// What comes before the first and after the last value is there twice, so that a spline finds its four by four.
+Grid with_margin(const Grid& grid, std::size_t n) {
   Grid out;
-  out.reserve(n * (n + 3));
-  for (std::size_t y = 0; y < n; ++y) {
-    for (std::size_t x = 0; x < n + 3; ++x) out.push_back(grid[y * n + (x + n - 1) % n]);
+  out.reserve((n + 3) * (n + 3));
+  for (std::size_t y = 0; y < n + 3; ++y) {
+    for (std::size_t x = 0; x < n + 3; ++x) out.push_back(grid[(y + n - 1) % n * n + (x + n - 1) % n]);
   }
   return out;
 }
@@ -133,53 +128,75 @@ Grid softened(const Grid& grid, std::size_t n, double variance) {
   return out;
 }
 
-// Of the four values around a place, `f` beyond the second of them: a cubic B-spline.
-Eigen::Array4f spline_weights(float f) {
-  const float g = 1 - f, f2 = f * f, g2 = g * g;
-  return {g2 * g / 6, (4 - 3 * f2 * (2 - f)) / 6, (4 - 3 * g2 * (2 - g)) / 6, f2 * f / 6};
+// Of the four values around a place between the second and the third of them: a cubic B-spline, at so many places.
+constexpr int places = 256;
+using SplineTable = std::array<Eigen::Array4f, places>;
+const SplineTable& spline_table() {
+  static const SplineTable all = [] {
+    SplineTable out;
+    for (int i = 0; i < places; ++i) {
+      const float f = (static_cast<float>(i) + 0.5F) / places, g = 1 - f, f2 = f * f, g2 = g * g;
+      out[static_cast<std::size_t>(i)] = {g2 * g / 6, (4 - 3 * f2 * (2 - f)) / 6, (4 - 3 * g2 * (2 - g)) / 6, f2 * f / 6};
+    }
+    return out;
+  }();
+  return all;
+}
+
+// Metres as parts of the texture's side, of which 2^32 are the whole: what is beyond repeats by overflow.
+std::uint32_t part_of_side(double metres) { return static_cast<std::uint32_t>(static_cast<std::int64_t>(metres * (0x1p32 / side))); }
+
+// The row in one of the copies.
+float seen_in(const Grid& grid, std::size_t level, const Texture::Row& row) {
+  const SplineTable& table = spline_table();
+  const auto doublings = std::bit_width(static_cast<unsigned>(size)) - 1 - static_cast<int>(level / 2);
+  const std::size_t stride = (std::size_t{1} << doublings) + 3;
+  const std::uint32_t half = 0x80000000U >> doublings, step_x = part_of_side(row.apart.x()), step_y = part_of_side(row.apart.y());
+  std::uint32_t x = part_of_side(row.first.x()) - half, y = part_of_side(row.first.y()) - half;
+  Eigen::Array4f sum = Eigen::Array4f::Zero();
+  for (const float weight : row.weights) {
+    // Texel in the upper half, place beyond it in the lower one.
+    const std::uint64_t column = std::uint64_t{x} << doublings, line = std::uint64_t{y} << doublings;
+    const float* texels = grid.data() + (line >> 32) * stride + (column >> 32);
+    const Eigen::Array4f &across = table[column >> 24 & 255], &down = table[line >> 24 & 255];
+    const auto texels_of = [&](std::size_t r) { return Eigen::Map<const Eigen::Array4f>(texels + r * stride); };
+    sum += weight * across * (down[0] * texels_of(0) + down[1] * texels_of(1) + down[2] * texels_of(2) + down[3] * texels_of(3));
+    x += step_x;
+    y += step_y;
+  }
+  return sum.sum();
 }
 
 }  // namespace
 
-Texture::Texture(Pattern pattern, std::uint64_t seed) {
+Texture::Texture(Pattern pattern, std::uint64_t seed) : plain_(pattern == Pattern::plain) {
+  if (plain_) return;
   Grid grid = paint(pattern, seed);
   for (float& value : grid) value = std::clamp(value, 0.0F, 1.0F);
   grid = softened(grid, size, of_copy - 1.0 / 12);  // a painted texel is a box
   for (std::size_t n = size;; n /= 2) {
-    levels_.push_back(with_wrapped_columns(grid, n));
-    levels_.push_back(with_wrapped_columns(softened(grid, n, of_copy + of_spline), n));
+    levels_.push_back(with_margin(grid, n));
+    levels_.push_back(with_margin(softened(grid, n, of_copy + of_spline), n));
     if (n == 1) break;
     grid = halved(grid, n);
   }
 }
 
-float Texture::spline(std::size_t level, double x, double y) const {
-  const auto n = static_cast<std::size_t>(size >> level / 2), mask = n - 1, stride = n + 3;
-  const double px = x * static_cast<double>(n) - 0.5, py = y * static_cast<double>(n) - 0.5, fx = whole(px), fy = whole(py);
-  const auto i = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(fx)) & mask;
-  const auto j = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(fy)) + mask;  // the row before, and never below zero
-  const Eigen::Array4f across = spline_weights(static_cast<float>(px - fx)), down = spline_weights(static_cast<float>(py - fy));
-  const float* texels = levels_[level].data() + i;
-  Eigen::Array4f sum = Eigen::Array4f::Zero();
-  for (std::size_t r = 0; r < 4; ++r) {
-    sum += down[static_cast<Eigen::Index>(r)] * Eigen::Map<const Eigen::Array4f>(texels + ((j + r) & mask) * stride);
-  }
-  return (across * sum).sum();
-}
-
-// From copy to copy the variance doubles. Between two of them, shares of both have the variance that is wanted.
+// From copy to copy the variance doubles: which one is the exponent of the ratio, and what the ratio has beyond a power of two is the share
+// of the next one with which both together have the variance that is wanted.
 Texture::Blur Texture::blur_of(double sigma) {
   constexpr double finest = texel * texel * (of_copy + of_spline);
-  const double ratio = std::max(sigma * sigma / finest, 1.0);
-  const int level = std::ilogb(ratio), coarsest = 2 * std::ilogb(static_cast<double>(size));
-  if (level >= coarsest) return {static_cast<std::size_t>(coarsest), 0};
-  return {static_cast<std::size_t>(level), static_cast<float>(std::ldexp(ratio, -level) - 1)};
+  constexpr std::uint32_t coarsest = 2 * (std::bit_width(static_cast<unsigned>(size)) - 1), one = 0x3f800000, mantissa = 0x7fffff;
+  const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(std::max(sigma * sigma / finest, 1.0)));
+  const std::uint32_t level = (bits - one) >> 23;
+  if (level >= coarsest) return {coarsest, 0};
+  return {level, std::bit_cast<float>(one | (bits & mantissa)) - 1};
 }
 
-float Texture::at(double u, double v, const Blur& blur) const {
-  const double x = u / side - whole(u / side), y = v / side - whole(v / side);
-  const float fine = spline(blur.level, x, y);
-  return blur.next > 0.01F ? fine + blur.next * (spline(blur.level + 1, x, y) - fine) : fine;
+float Texture::along(const Row& row, const Blur& blur) const {
+  if (plain_) return 0.5F;
+  const float fine = seen_in(levels_[blur.level], blur.level, row);
+  return blur.next > 0.01F ? fine + blur.next * (seen_in(levels_[blur.level + 1], blur.level + 1, row) - fine) : fine;
 }
 
 }  // namespace kilvo::lab

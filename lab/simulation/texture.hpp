@@ -1,7 +1,9 @@
 // Procedural patterns with their smaller copies, so that what is far is seen averaged, as a lens and a pixel would average it.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace kilvo::lab {
@@ -21,14 +23,19 @@ class Texture {
   /// What looks as if seen through a Gaussian of `sigma` metres on the surface.
   static Blur blur_of(double sigma);
 
-  /// Between 0 and 1 at (u, v), in metres on the surface; repeats every 4.1 m.
-  float at(double u, double v, const Blur& blur) const;
+  /// Equal steps on the surface, and how much each counts.
+  struct Row {
+    Eigen::Vector2d first, apart;    // m
+    std::span<const float> weights;  // their sum is 1
+  };
+  /// Between 0 and 1; repeats every 4.1 m.
+  float along(const Row& row, const Blur& blur) const;
 
  private:
-  float spline(std::size_t level, double x, double y) const;
-
-  // Each with twice the blur's variance of the one before, every second half as wide; three columns come again at the end of each row.
+  // Each with twice the blur's variance of the one before, every second half as wide. The last row and column and the first two come again
+  // beyond the other end.
   std::vector<std::vector<float>> levels_;
+  bool plain_ = false;
 };
 
 }  // namespace kilvo::lab

@@ -35,8 +35,15 @@ SE3 pivot(double x, double z, double angle) {
   return {R, edge - R * edge};
 }
 
-// From where the foot left to where it comes down; u from 0 to 1. Up first, then across; down last. Up and down not from and to rest: the
-// ground holds a foot, and stops it.
+// How far a foot comes in t seconds that gets under way at one metre a second.
+double under_way(double t) {
+  constexpr double takes = 0.01;  // s
+  const double x = std::min(t / takes, 1.0);
+  return takes * x * x * x * (1 - x / 2) + std::max(t - takes, 0.0);
+}
+
+// From where the foot left to where it comes down; u from 0 to 1. Up first, then across; down last. Up at once, as a sole is pulled off by
+// a heel that has been rising, and not down to rest: the ground stops it.
 SE3 swing(const SE3& from, const Footprint& next, double lasts, double u) {
   const SE3& to = next.sole;
   const double rise = to.p.z() - from.p.z();
@@ -46,7 +53,7 @@ SE3 swing(const SE3& from, const Footprint& next, double lasts, double u) {
   SE3 out{from.R * SO3::Exp(across * (from.R.inverse() * to.R).Log()), from.p + across * (to.p - from.p)};
   out.p.z() = from.p.z() + up * rise + next.swing_lift * smooth_bump(u);
   const double back = 1 - u;
-  out.p.z() += lasts * u * back * (next.swing_leaving * back * back + next.swing_landing * u * u);
+  out.p.z() += back * (under_way(lasts * u) * next.swing_leaving * back * back + lasts * u * u * u * next.swing_landing);
   return out;
 }
 

@@ -13,6 +13,7 @@ namespace kilvo::lab {
 namespace {
 
 constexpr int most_looks = 24;
+constexpr float nearest = 0.05F;  // m
 
 // Circles in a row with weights like an upturned parabola, which let through little of what is finer than a pixel.
 struct Row {
@@ -57,7 +58,7 @@ Looks looks_through(const Eigen::Vector2d& right, const Eigen::Vector2d& down, d
   if (large < round * round * small) return {1, std::sqrt((large + small) / 2), Eigen::Vector2d::Zero()};
   // The row's variance makes up for what the circles lack.
   const double lack = std::sqrt(large - small), sigma = std::sqrt(small);
-  const int count = std::clamp(static_cast<int>(std::ceil(per_sigma * lack / sigma)), 2, most_looks);
+  const int count = std::clamp(1 + static_cast<int>(per_sigma * lack / sigma), 2, most_looks);
   const Eigen::Vector2d along = a > c ? Eigen::Vector2d((a - c) / 2 + spread, b) : Eigen::Vector2d(b, (c - a) / 2 + spread);
   return {count, sigma, rows()[static_cast<std::size_t>(count)].apart * lack * along.normalized()};
 }
@@ -143,7 +144,15 @@ World::World(Scene scene, std::uint64_t seed) : scene_(std::move(scene)), rays_(
   for (const Surface& s : scene_.surfaces) {
     const auto shade = static_cast<float>(0.72 + 0.28 * std::abs(s.normal().dot(light)));
     const double u = random.uniform(0, 4), v = random.uniform(0, 4);
-    faces_.push_back({s.corner, s.normal(), s.u.normalized(), s.v.normalized(), {u, v}, shade});
+    const Material& m = scene_.materials[s.material];
+    faces_.push_back({s.corner,
+                      s.normal(),
+                      s.u.normalized(),
+                      s.v.normalized(),
+                      {u, v},
+                      shade * m.dark,
+                      shade * (m.bright - m.dark),
+                      &textures_[static_cast<std::size_t>(m.pattern)]});
   }
 }
 
@@ -156,7 +165,7 @@ std::optional<Hit> World::cast(const Eigen::Vector3d& origin, const Eigen::Vecto
   query.ray = {at(origin.x()),
                at(origin.y()),
                at(origin.z()),
-               0.05F,
+               nearest,
                at(direction.x()),
                at(direction.y()),
                at(direction.z()),
@@ -169,10 +178,45 @@ std::optional<Hit> World::cast(const Eigen::Vector3d& origin, const Eigen::Vecto
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcIntersect1(rays_->scene, &context, &query);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  // Which surface is Embree's to say; where on it, to the last bit, is not left to single precision.
+  return query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? std::nullopt : hit_on(query.hit.primID, origin, direction);
+}
+
+std::array<std::optional<Hit>, World::bundle> World::cast(const Eigen::Vector3d& origin,
+                                                          const std::array<Eigen::Vector3d, bundle>& directions) const {
+  const Eigen::Vector3f from = origin.cast<float>();
+  alignas(64) std::array<int, bundle> valid;
+  valid.fill(-1);
+  RTCRayHit16 query;
+  for (std::size_t i = 0; i < bundle; ++i) {
+    const Eigen::Vector3f direction = directions[i].cast<float>();
+    query.ray.org_x[i] = from.x();
+    query.ray.org_y[i] = from.y();
+    query.ray.org_z[i] = from.z();
+    query.ray.dir_x[i] = direction.x();
+    query.ray.dir_y[i] = direction.y();
+    query.ray.dir_z[i] = direction.z();
+    query.ray.tnear[i] = nearest;
+    query.ray.tfar[i] = std::numeric_limits<float>::infinity();
+    query.ray.time[i] = 0;
+    query.ray.mask[i] = ~0U;
+    query.ray.id[i] = query.ray.flags[i] = 0;
+    query.hit.geomID[i] = query.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect16(valid.data(), rays_->scene, &context, &query);
+  std::array<std::optional<Hit>, bundle> out;
+  for (std::size_t i = 0; i < bundle; ++i) {
+    if (query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) out[i] = hit_on(query.hit.primID[i], origin, directions[i]);
+  }
+  return out;
+}
+
+// Which surface is Embree's to say; where on it, to the last bit, is not left to single precision.
+std::optional<Hit> World::hit_on(unsigned triangle, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
   Hit hit;
-  hit.surface = query.hit.primID / 2;
+  hit.surface = triangle / 2;
   const Face& face = faces_[hit.surface];
   const double along = face.normal.dot(direction);
   if (std::abs(along) < 1e-9) return std::nullopt;
@@ -185,22 +229,21 @@ std::optional<Hit> World::cast(const Eigen::Vector3d& origin, const Eigen::Vecto
 }
 
 Colour World::radiance(const Hit& hit, const PixelRay& ray, double blur) const {
-  const Material& material = scene_.materials[scene_.surfaces[hit.surface].material];
   const Face& face = faces_[hit.surface];
-  // How far a pixel to the right and a pixel down are on the surface.
   const double along = face.normal.dot(ray.direction);
   const auto on_surface = [&](const Eigen::Vector3d& change) {
     const Eigen::Vector3d d = hit.range * (change - face.normal.dot(change) / along * ray.direction);
     return Eigen::Vector2d(d.dot(face.u), d.dot(face.v));
   };
-  const Looks looks = looks_through(on_surface(ray.right), on_surface(ray.down), blur);
-  const Texture::Blur each = Texture::blur_of(looks.sigma);
-  const Texture& texture = textures_[static_cast<std::size_t>(material.pattern)];
-  Eigen::Vector2d at = Eigen::Vector2d(hit.u, hit.v) + face.offset - (looks.count - 1) / 2.0 * looks.apart;
-  const auto& weights = rows()[static_cast<std::size_t>(looks.count)].weights;
-  float tone = 0;
-  for (int k = 0; k < looks.count; ++k, at += looks.apart) tone += weights[static_cast<std::size_t>(k)] * texture.at(at.x(), at.y(), each);
-  return face.shade * (material.dark + tone * (material.bright - material.dark));
+  return radiance(hit, on_surface(ray.right), on_surface(ray.down), blur);
+}
+
+Colour World::radiance(const Hit& hit, const Eigen::Vector2d& right, const Eigen::Vector2d& down, double blur) const {
+  const Face& face = faces_[hit.surface];
+  const Looks looks = looks_through(right, down, blur);
+  const Eigen::Vector2d first = Eigen::Vector2d(hit.u, hit.v) + face.offset - (looks.count - 1) / 2.0 * looks.apart;
+  const std::span weights(rows()[static_cast<std::size_t>(looks.count)].weights.data(), static_cast<std::size_t>(looks.count));
+  return face.dark + face.texture->along({first, looks.apart, weights}, Texture::blur_of(looks.sigma)) * face.more;
 }
 
 double World::reflectivity(const Hit& hit) const { return scene_.materials[scene_.surfaces[hit.surface].material].reflectivity; }

@@ -65,8 +65,14 @@ class World {
   /// The nearest surface along a unit direction, at least 5 cm away. May be called by several threads.
   std::optional<Hit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
+  static constexpr std::size_t bundle = 16;
+  /// The same of several directions at once; cheaper if they are similar.
+  std::array<std::optional<Hit>, bundle> cast(const Eigen::Vector3d& origin, const std::array<Eigen::Vector3d, bundle>& directions) const;
+
   /// Light that comes from there, through a Gaussian of `blur` pixels: of the surface that is an ellipse, long where it is grazed.
   Colour radiance(const Hit& hit, const PixelRay& ray, double blur) const;
+  /// The same where it is known how far a pixel to the right and a pixel below are on the surface, m.
+  Colour radiance(const Hit& hit, const Eigen::Vector2d& right, const Eigen::Vector2d& down, double blur) const;
   const Colour& sky() const { return scene_.sky; }
   double reflectivity(const Hit& hit) const;
 
@@ -75,12 +81,15 @@ class World {
 
  private:
   struct Rays;  // Embree's
-  /// A surface made ready: unit vectors, where in the texture its corner lies, how the light falls on it.
+  /// A surface made ready: unit vectors, where in the texture its corner lies, its colours in the light that falls on it.
   struct Face {
     Eigen::Vector3d corner, normal, u, v;
     Eigen::Vector2d offset;
-    float shade;
+    Colour dark, more;  // what the texture's brightest has more than its darkest
+    const Texture* texture;
   };
+  std::optional<Hit> hit_on(unsigned triangle, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
+
   Scene scene_;
   std::vector<Texture> textures_;  // by Pattern
   std::vector<Face> faces_;        // by surface

@@ -10,8 +10,8 @@
 
 namespace kilvo::test {
 
-/// The surfaces as far as the LiDAR can see them from somewhere on its way, in the estimator's world. `T_WR`: the simulated world there.
-inline VoxelMap known_world(const lab::Simulator& simulator, const SE3& T_WR, const MapConfig& config = {}) {
+/// Points on the surfaces as far as the LiDAR can see them from somewhere on its way, in the simulated world.
+inline std::vector<Eigen::Vector3d> seen_points(const lab::Simulator& simulator) {
   std::vector<Eigen::Vector3d> stations;
   for (double t = 0; t < simulator.duration(); t += 1)
     stations.push_back(simulator.walk().torso(t) * simulator.config().shape.T_torso_lidar.p);
@@ -27,9 +27,15 @@ inline VoxelMap known_world(const lab::Simulator& simulator, const SE3& T_WR, co
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     constexpr double spacing = 0.04;  // m
     for (const Eigen::Vector3d& p : points_on(surfaces[i].corner, surfaces[i].u, surfaces[i].v, spacing)) {
-      if (is_seen(p, i)) points.push_back(T_WR * p);
+      if (is_seen(p, i)) points.push_back(p);
     }
   }
+  return points;
+}
+
+/// The map of these points in the estimator's world. `T_WR`: the simulated world there.
+inline VoxelMap known_world(std::vector<Eigen::Vector3d> points, const SE3& T_WR, const MapConfig& config = {}) {
+  for (Eigen::Vector3d& p : points) p = T_WR * p;
   constexpr double practically_exact = 1e-5;  // m
   const std::vector<PointGroup> groups = groups_of(points, config.voxel_size / 4, practically_exact);
   VoxelMap map(config);
