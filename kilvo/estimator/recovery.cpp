@@ -9,7 +9,7 @@ namespace {
 // A humanoid that walks: how fast it turns, how much it leans, how much its velocity changes and how far that takes it (one sigma).
 constexpr double turning = 0.4;        // rad/s
 constexpr double leaning = 0.06;       // rad
-constexpr double velocity = 0.35;      // m/s
+constexpr double velocity = 0.3, more_velocity = 0.1;  // m/s, m/s per s of the gap
 constexpr double acceleration = 3.0;   // m/s^2: in a short gap the velocity has not had the time to change by all that
 
 constexpr double statistics_time = 2.0;  // s
@@ -20,7 +20,7 @@ constexpr double block = 0.25;           // s
 void widen(Estimate& e, Time begin, Time end, double gap) {
   const double share = gap > 0 ? std::clamp(to_seconds(end - begin) / gap, 0.0, 1.0) : 1.0;
   const double lean = std::min(leaning, turning * gap), turn = turning * gap;
-  const double dv = std::min(velocity, acceleration * gap), dp = dv * gap;
+  const double dv = std::min(velocity + more_velocity * gap, acceleration * gap), dp = dv * gap;
   // Leaning is about the horizontal, turning about the vertical.
   const Eigen::Vector3d up_I = e.x.R.matrix().transpose() * -e.x.g.normalized();
   e.P.block<3, 3>(at::R, at::R) +=

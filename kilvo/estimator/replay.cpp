@@ -51,10 +51,11 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   const double gyro2 = gyro_variance_.sum() + least_gyro * least_gyro, accel2 = accel_variance_.sum() + least_accel * least_accel;
   interval.gyro_scale = gyro2 * gap / (config_.noise.gyro * config_.noise.gyro);
   interval.accel_scale = accel2 * gap / (config_.noise.accel * config_.noise.accel);
+  if (gap > blind_gap) interval.accel_scale = 1;  // more is added after the prediction (widen)
   constexpr double told_by_its_ends = 0.25;  // s
   if (gap > told_by_its_ends) {
-    // The two samples say nothing of the time between: what a walking robot may have done is added after the prediction (widen).
-    interval.gyro_scale = interval.accel_scale = 1;
+    // The two samples say nothing of the time between.
+    interval.gyro_scale = 1;
     interval.gyro_begin = interval.gyro_end = x.bg;
     interval.accel_begin = interval.accel_end = x.ba - x.R.inverse() * x.g;
   }

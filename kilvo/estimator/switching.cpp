@@ -18,6 +18,16 @@ constexpr int consistent_sweeps = 3;
 // Sweeps that fitted nowhere for so long: the robot is where the map is not.
 constexpr Duration longest_refusal = std::chrono::seconds(2);
 
+// A scan that was undistorted with a velocity that is not known: its ends are out of place, at the worst all on one side.
+PoseCovariance noise_of_velocity(const Covariance& P) {
+  constexpr double half_scan = 0.05, on_one_side = 0.5, per_metre = 0.3;  // s, -, rad/m
+  const double smear = half_scan * half_scan * P.diagonal().segment<3>(at::v).maxCoeff();
+  PoseCovariance out = PoseCovariance::Zero();
+  out.diagonal().head<3>().setConstant(per_metre * per_metre * smear);
+  out.diagonal().tail<3>().setConstant(on_one_side * on_one_side * smear);
+  return out;
+}
+
 std::string milliseconds_of(double seconds) { return std::to_string(std::lround(1e3 * seconds)) + " ms"; }
 
 }  // namespace
@@ -137,9 +147,10 @@ bool Estimator::register_sweep(const Estimate& prior, LidarModel& model, const s
   if (!needs_search(prior.P, PoseCovariance::Identity() - weak_)) {
     UpdateConfig patient = config_.update;
     if (recovery_.sweeps_to_go > 0) patient.max_iterations *= 3;
+    const PoseCovariance noise = recovery_.sweeps_to_go > 0 ? within_scan + noise_of_velocity(prior.P) : within_scan;
     const auto measured = [&](const State& x, const Covariance& P) {
       Information<6> info = model(x, P);
-      add_common_noise(within_scan, info);
+      add_common_noise(noise, info);
       return info;
     };
     estimate_ = update(prior, measured, patient).posterior;
@@ -150,12 +161,10 @@ bool Estimator::register_sweep(const Estimate& prior, LidarModel& model, const s
   if (!found) return false;
   ++statistics_.found;
   recovery_.sweeps_to_go = consistent_sweeps;
-  // The scan was undistorted with a velocity and a tilt that were guesses.
-  constexpr double half_scan = 0.05, found_rotation = 0.006, found_position = 0.005;  // s, rad, m
-  const double sigma_v2 = prior.P.diagonal().segment<3>(at::v).maxCoeff();
-  PoseCovariance guessed = within_scan;
+  constexpr double found_rotation = 0.006, found_position = 0.005;  // rad, m
+  PoseCovariance guessed = within_scan + noise_of_velocity(prior.P);
   guessed.diagonal().head<3>().array() += found_rotation * found_rotation;
-  guessed.diagonal().tail<3>().array() += found_position * found_position + 0.25 * half_scan * half_scan * sigma_v2;
+  guessed.diagonal().tail<3>().array() += found_position * found_position;
   const auto measured = [&](const State& x, const Covariance&) {
     Information<6> info = information_at(*found, x);
     add_common_noise(guessed, info);

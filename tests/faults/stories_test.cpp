@@ -118,7 +118,7 @@ TEST_F(Faults, AClockAheadOfTheImuIsMeasuredAndItsSensorNotUsed) {
     EXPECT_GT(h.off_clock, 50u);
     EXPECT_NEAR(h.clock_offset, 0.3, 0.02);
     EXPECT_LT(o.worst(&Moment::error, 6, 14), 0.05);
-    EXPECT_THAT(o.statistics.warnings, testing::Contains(testing::HasSubstr("clock is 300 ms ahead")));
+    EXPECT_THAT(o.statistics.warnings, testing::Contains(testing::HasSubstr("ms ahead of the IMU")));
   }
 }
 
@@ -127,6 +127,45 @@ TEST_F(Faults, AnImuThatComesLateIsNoFaultOfTheOthers) {
   say("imu delayed", o, 0, 14);
   EXPECT_EQ(o.modality_at(12), Modality::kil);
   EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.05);
+}
+
+// KILVO_SEEDS=20 kilvo_faults_test --gtest_filter=Coasting.*
+TEST(Coasting, ForTwoSecondsSigmaIsAboutTheError) {
+  const char* text = std::getenv("KILVO_SEEDS");
+  const int seeds = text != nullptr ? std::atoi(text) : 4;
+  double squares = 0, sigma = 0, worst = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const FailingWalk walk("room", static_cast<std::uint64_t>(seed), 10);
+    const Outcome o = walk.with({{FailureKind::drop, Sensor::lidar, 6, 8}, {FailureKind::drop, Sensor::legs, 6, 8}});
+    const double error = o.worst(&Moment::error, 7.9, 8), s = o.worst(&Moment::sigma, 7.9, 8);
+    squares += error * error / seeds;
+    sigma += s / seeds;
+    worst = std::max(worst, o.worst(&Moment::sigmas, 6, 10));
+    EXPECT_LT(o.worst(&Moment::error, 9, 10), 0.02) << seed;
+  }
+  std::printf("2 s of the IMU alone, %d seeds: RMS error %.4f m, sigma %.4f m, at most %.1f sigmas\n", seeds, std::sqrt(squares), sigma, worst);
+  EXPECT_LT(worst, 4.0);
+  EXPECT_LT(sigma, 5 * std::sqrt(squares));
+}
+
+// KILVO_STANDING=600 kilvo_faults_test --gtest_filter=Standing.*
+TEST(Standing, DriftsByNothing) {
+  const char* text = std::getenv("KILVO_STANDING");
+  const double seconds = text != nullptr ? std::atof(text) : 15;
+  const FailingWalk walk("stand", 1, seconds);
+  const Outcome o = walk.with({});
+  std::printf("standing %.0f s: worst error %.4f m\n", seconds, o.worst(&Moment::error, 0, seconds));
+  EXPECT_LT(o.worst(&Moment::error, 0, seconds), 0.005);
+  EXPECT_EQ(o.changes(), std::vector<std::string>{"KIL"});
+}
+
+TEST(Standing, WithTheImuAloneItStays) {
+  const FailingWalk walk("stand", 1, 16);
+  const Outcome o = walk.with({{FailureKind::drop, Sensor::lidar, 5, 15}, {FailureKind::drop, Sensor::legs, 5, 15}});
+  std::printf("10 s of the IMU alone: worst error %.4f m, %.1f sigmas\n", o.worst(&Moment::error, 0, 16), o.worst(&Moment::sigmas, 0, 16));
+  EXPECT_EQ(o.modality_at(10), Modality::coast);
+  EXPECT_LT(o.worst(&Moment::error, 0, 16), 0.05);
+  EXPECT_LT(o.worst(&Moment::sigmas, 0, 16), 4.0);
 }
 
 TEST_F(Faults, ASensorThatComesLateOrNever) {
