@@ -11,6 +11,8 @@ namespace {
 
 // A measurement cannot have been taken so much later than the newest of the IMU, which arrives at once, s.
 constexpr double most_ahead = 0.25, witnessed_ahead = 0.12;
+// Stamps farther apart than this are of a clock that has jumped.
+constexpr Duration jump = std::chrono::seconds(1);
 // The clocks are compared over so long, s.
 constexpr double clock_window = 0.05;
 // So many messages without a repetition show that a sensor is alive and noisy: only then does sameness mean anything.
@@ -55,7 +57,7 @@ void Health::time(StreamHealth& stream, Tracker& tracker, Time t) {
     stream.jitter = std::sqrt(tracker.interval_squares / n);
     stream.longest_gap = std::max(stream.longest_gap, dt);
   }
-  if (!tracker.stamp || t > *tracker.stamp) tracker.stamp = t;
+  tracker.stamp = t;
 }
 
 bool Health::repeats(const Measurement& m, Tracker& tracker) {
@@ -165,7 +167,8 @@ const char* Health::judge(const Measurement& m) {
   StreamHealth& stream = streams_[m.index()];
   Tracker& tracker = trackers_[m.index()];
   const Time t = completion_of(m);
-  if (tracker.stamp && t == *tracker.stamp) return nullptr;  // the timeline counts duplicates
+  // Duplicates and what comes late, between newer ones, are the timeline's business.
+  if (tracker.stamp && t <= *tracker.stamp && *tracker.stamp - t < jump) return nullptr;
   if (const char* same = judge_repeats(m, stream, tracker)) {
     ++stream.messages;
     return same;
