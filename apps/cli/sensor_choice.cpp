@@ -36,6 +36,9 @@ std::optional<double> take_seconds(std::string_view& text) {
 std::vector<Sensor> as_wanted(const std::vector<Sensor>& wanted, const lab::Settings& settings, const std::string& config) {
   if (std::ranges::find(wanted, Sensor::imu) == wanted.end())
     throw UsageError("--sensors: the imu is needed, nothing is estimated without it");
+  const auto wants = [&wanted](Sensor sensor) { return std::ranges::find(wanted, sensor) != wanted.end(); };
+  if (wants(Sensor::camera) && !wants(Sensor::lidar))
+    throw UsageError("--sensors: the camera needs the lidar, whose surfaces its patches lie on");
   for (const Sensor sensor : wanted) {
     if (!settings.has(sensor))
       throw UsageError(fmt::format("{}: {}.topic is missing: the sensor '{}' is not configured", config, name_of(sensor), name_of(sensor)));

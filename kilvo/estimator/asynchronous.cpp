@@ -33,6 +33,7 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   if (last_legs_ && health_.is_frozen(Sensor::legs)) lose_legs(s.t);
   if (last_legs_ && heard - *last_legs_ > silence(robot_.legs.rate, 5, std::chrono::milliseconds(50))) lose_legs(s.t);
   if (!pending_.empty() && pending_.front().end <= s.t) {
+    estimate_ = closed_;  // should all of it wait, or be dropped
     process_pending(s.t, out);
     closed_ = *estimate_;
   }

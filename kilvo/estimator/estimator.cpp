@@ -38,6 +38,7 @@ const char* fault_of(const Measurement& m) {
     if (beyond(joints->position, absurd_position) || beyond(joints->velocity, absurd_velocity)) return "absurd value";
   }
   if (const auto* scan = std::get_if<LidarScan>(&m); scan != nullptr && scan->points.empty()) return "empty";
+  if (const auto* image = std::get_if<CameraImage>(&m); image != nullptr && image->image.empty()) return "empty";
   return nullptr;
 }
 
@@ -91,6 +92,7 @@ void Estimator::push(Measurement m, std::vector<Output>& out) {
 std::vector<Output> Estimator::finish() {
   std::vector<Output> out;
   timeline_.end();
+  ended_ = true;
   for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, "time jump");
   while (auto next = timeline_.pop()) handle(*next, out);
   // A scan that ends between the last IMU sample and where the next would have been: the last sample is held.
@@ -165,6 +167,7 @@ void Estimator::handle_before_start(Measurement& m, std::vector<Output>& out) {
   std::optional<Start> start;
   if (const auto* imu = std::get_if<ImuSample>(&m)) start = initialiser_.add(*imu);
   before_start_.push_back(std::move(m));
+  bound_images_before_start();
   // A moving start looks this far back and no farther.
   const Time oldest = completion_of(before_start_.back()) - from_seconds(config_.initial.moving_start + 1.0);
   while (completion_of(before_start_.front()) < oldest) {
@@ -172,6 +175,15 @@ void Estimator::handle_before_start(Measurement& m, std::vector<Output>& out) {
     before_start_.pop_front();
   }
   if (start) begin(*start, out);
+}
+
+// Images are large, and only those of the still window will be of use.
+void Estimator::bound_images_before_start() {
+  constexpr int most = 8;
+  const auto is_image = [](const Measurement& m) { return std::holds_alternative<CameraImage>(m); };
+  if (!is_image(before_start_.back()) || std::ranges::count_if(before_start_, is_image) <= most) return;
+  before_start_.erase(std::ranges::find_if(before_start_, is_image));
+  drop(Sensor::camera, "before the start");
 }
 
 void Estimator::begin(const Start& start, std::vector<Output>& out) {

@@ -58,6 +58,7 @@ class Estimator {
   void handle_before_start(Measurement& m, std::vector<Output>& out);
   void begin(const Start& start, std::vector<Output>& out);
   void bound_pending();
+  void bound_images_before_start();
   void warn_of_unused_sensors();
   void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
   bool uses(Sensor s) const { return used_[static_cast<std::size_t>(s)]; }
@@ -93,6 +94,8 @@ class Estimator {
   // images.cpp
   const char* image_fault(const CameraImage& image);
   void process(const CameraImage& image);
+  bool is_lost_among_patches(const Estimate& prior) const;
+  bool says_nothing(const PhotometricModel::Report& report);
   void check_mount(const PhotometricModel& model, const SO3& R_WI);
   void learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid, const DepthView& depth,
                   const Estimate& prior);
@@ -115,6 +118,7 @@ class Estimator {
     Time middle() const { return begin + (end - begin) / 2; }
   };
   std::deque<Pending> pending_;  // by end
+  bool ended_ = false;
   std::deque<Output> sweeps_;    // results of sweeps, each to go out with one of the next leg samples
   std::deque<Output> images_;    // the same of images
   std::optional<Time> last_output_;
@@ -129,9 +133,9 @@ class Estimator {
   SE3 T_CI_;
   VisualMap visual_map_;
   MountCheck mount_check_;
-  bool mount_is_doubted_ = false;
+  bool mount_is_doubted_ = false, size_is_doubted_ = false;
+  int images_in_vain_ = 0;
   std::vector<PointXYZI> seen_W_;      // points of the last sweep
-  std::vector<std::uint8_t> picture_;             // of the last image
   std::optional<Eigen::Vector3d> last_seen_from_;  // where the last image was taken, m
 
   std::optional<LegKinematics> kinematics_;

@@ -35,25 +35,38 @@ SE3 as_the_map_has_it(const State& before, const State& after, const PoseCovaria
 // What makes an image no use at all; nullptr: nothing.
 const char* Estimator::image_fault(const CameraImage& image) {
   const Image& picture = image.image;
-  if (picture.empty()) return "empty";
-  if (picture.width != robot_.camera.width || picture.height != robot_.camera.height) return "another size than configured";
-  if (picture.pixels == picture_) return "the same picture again";
-  picture_ = picture.pixels;
-  return nullptr;
+  if (picture.width != robot_.camera.width || picture.height != robot_.camera.height) {
+    if (!std::exchange(size_is_doubted_, true)) {
+      statistics_.warnings.push_back("camera: images of " + std::to_string(picture.width) + " x " + std::to_string(picture.height) +
+                                     " pixels cannot be used: camera.width and camera.height say " + std::to_string(robot_.camera.width) +
+                                     " x " + std::to_string(robot_.camera.height));
+    }
+    return "another size than configured";
+  }
+  if (picture.channels != 1 && picture.channels != 3) return "neither grey nor colour";
+  const std::size_t values = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height) *
+                             static_cast<std::size_t>(picture.channels);
+  return picture.pixels.size() == values ? nullptr : "cut short";
 }
 
 void Estimator::process(const CameraImage& image) {
   if (image.t < anchor_.t) return drop(Sensor::camera, "before the state");
   if (replay_.is_blind(image.t, image.t)) return drop(Sensor::camera, "no IMU");
   if (seen_W_.empty()) return drop(Sensor::camera, "before the first sweep");
+  // Vision lives by the surfaces of the LiDAR: without it, nobody can tell what hides what, and images can only drift.
+  constexpr int scans = 3;
+  if (image.t - last_middle_ > from_seconds((scans + 0.5) / robot_.lidar.rate)) return drop(Sensor::camera, "no LiDAR");
+  if (recovery_.sweeps_to_go > 0) return drop(Sensor::camera, "before the map is joined again");
   Stopwatch watch;
   const std::vector<GreyImage> pyramid = pyramid_of(to_grey(image.image), Patch::levels);
   Estimate prior = anchor_;
   replay_.advance(prior, image.t, trajectory_);
+  if (is_lost_among_patches(prior)) return drop(Sensor::camera, "the pose is too uncertain");
   const SE3 expected = T_CI_ * prior.x.pose().inverse();
   const DepthView depth(*camera_, expected, seen_W_);
   const std::vector<Track> tracks = select_tracks(visual_map_, *camera_, expected, depth, config_.vision);
   PhotometricModel model(visual_map_, *camera_, T_CI_, pyramid, tracks, prior, config_.vision);
+  const Estimate unlit = prior;
   if (const auto tau = model.exposure_at(prior.x)) {
     // Lamps are switched and exposures jump: what it was says nothing, the image all.
     constexpr double unsure = 0.1;
@@ -66,20 +79,44 @@ void Estimator::process(const CameraImage& image) {
   update_config.min_iterations = model.iterations();
   update_config.max_iterations = std::max(update_config.max_iterations, model.iterations() + 2);
   estimate_ = tracks.empty() ? prior : update(prior, model, update_config).posterior;
+  if (!keep_finite()) return drop(Sensor::camera, "not finite");
+  check_mount(model, prior.x.R);
+  if (says_nothing(model.report())) {
+    estimate_ = unlit;
+    settle(*estimate_);
+    return drop(Sensor::camera, "agrees with nothing");
+  }
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::camera)].used;
-  if (!keep_finite()) return;
   trajectory_.correct(image.t, estimate_->x.pose(), estimate_->x.v - prior.x.v);
   const SE3 T_WI = estimate_->x.pose();
   if (!weak_.isZero(0) && model.report().used >= enough) map_error_.seen(T_WI, model.by_frame(), weak_, last_seen_from_ ? (T_WI.p - *last_seen_from_).norm() : 0);
   last_seen_from_ = T_WI.p;
   learn_from(model, tracks, pyramid, depth, prior);
-  check_mount(model, prior.x.R);
   settle(*estimate_);
   last_image_ = image.t;
   Output& seen = images_.emplace_back();
   seen.coloured = colours_of(image.image, estimate_->x.tau, *camera_, T_CI_ * estimate_->x.pose().inverse(), depth);
   seen.indicators = indicators_of(model.report().used);
   seen.stages.visual_us = watch.lap_us();
+}
+
+// Patches are found within some pixels of where they are expected. Along what the LiDAR does not see the way is the images' own: it may be
+// uncertain, and new patches are begun there.
+bool Estimator::is_lost_among_patches(const Estimate& prior) const {
+  constexpr double reach = 8, depth = 3;  // px, m
+  const PoseCovariance known = PoseCovariance::Identity() - weak_;
+  const PoseCovariance P = known * prior.P.topLeftCorner<6, 6>() * known.transpose();
+  const double turned = P.topLeftCorner<3, 3>().trace(), moved = P.bottomRightCorner<3, 3>().trace();
+  return robot_.camera.fx * std::sqrt(std::max(0.0, turned + moved / (depth * depth))) > reach;
+}
+
+// An image that hardly any of many patches is found in is dark, covered, torn, or of another world: nothing is learnt from it, unless
+// that goes on, for then the world has changed.
+bool Estimator::says_nothing(const PhotometricModel::Report& report) {
+  constexpr int one_in = 5, patient = 20;  // images
+  const bool nothing = report.tracks >= enough && one_in * report.used < report.tracks;
+  images_in_vain_ = nothing ? images_in_vain_ + 1 : 0;
+  return nothing && images_in_vain_ <= patient;
 }
 
 void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI) {
@@ -99,7 +136,7 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI) {
   const Eigen::Vector3d degrees = *psi * (180 / M_PI);
   statistics_.warnings.push_back("the images fit a camera that is turned by " + tenths(degrees.norm()) + " degrees or more (" + tenths(degrees.x()) +
                                  ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()) +
-                                 " about the axes of the IMU) against camera.T_imu_camera.R: is the calibration that of this robot?");
+                                 " about the axes of the IMU) against camera.T_imu_camera.R: is the calibration that of this robot, and camera.time_offset right?");
 }
 
 void Estimator::learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,
@@ -117,10 +154,13 @@ void Estimator::learn_from(const PhotometricModel& model, std::span<const Track>
   frame.noise(6, 6) = estimate_->P(at::tau, at::tau);
   const std::uint32_t id = visual_map_.add_frame(frame);
   const auto view = [&](const Eigen::Vector2d& pixel) -> std::optional<Observation> {
-    const auto patch = cut_patch(pyramid, pixel);
+    const Eigen::Vector2f stored = pixel.cast<float>();
+    const auto patch = cut_patch(pyramid, stored.cast<double>());
     if (!patch) return std::nullopt;
-    return Observation{id, pixel.cast<float>(), 1.0F, *patch};
+    return Observation{id, stored, 1.0F, *patch};
   };
+  // A point is not denied by an image that agrees with few others either.
+  const bool is_good = 2 * model.report().used > model.report().tracks;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const Track& track = tracks[i];
     const PhotometricModel::Verdict& verdict = model.verdicts()[i];
@@ -134,7 +174,7 @@ void Estimator::learn_from(const PhotometricModel& model, std::span<const Track>
         if (const auto seen = view(*pixel)) visual_map_.observe(track.point, *seen);
       }
     }
-    visual_map_.judge(track.point, track.observation, verdict.used, verdict.correlation);
+    if (verdict.used || (verdict.looked && is_good)) visual_map_.judge(track.point, track.observation, verdict.used, verdict.correlation);
   }
   for (const NewPoint& found : new_points(map_, *camera_, T_CW, pyramid[0], depth, tracks, config_.vision)) {
     if (const auto seen = view(found.pixel)) visual_map_.insert(found.point, *seen);

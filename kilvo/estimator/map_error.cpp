@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 #include "kilvo/filter/pose_error.hpp"
@@ -44,12 +45,15 @@ PoseCovariance MapError::at(const SE3& T_WI) const {
 
 std::uint32_t MapError::epoch_now(const SE3& T_WI, const PoseCovariance& P) {
   const PoseCovariance total = P + at(T_WI);
-  if (!epochs_.empty()) {
-    const PoseCovariance G = from_origin(T_WI);
-    const PoseCovariance last = G * epochs_.back() * G.transpose();
-    const Eigen::Array<double, 6, 1> ratio = total.diagonal().array() / last.diagonal().array();
-    if ((ratio < change && ratio > 1 / change).all() || epochs_.size() == max_epochs) return static_cast<std::uint32_t>(epochs_.size() - 1);
+  const PoseCovariance here = from_origin(T_WI);
+  // Sweeps and images take turns, each as sure as it is.
+  constexpr std::size_t recent = 4;
+  for (std::size_t k = epochs_.size(), tried = 0; k-- > 0 && tried < recent; ++tried) {
+    const PoseCovariance then = here * epochs_[k] * here.transpose();
+    const Eigen::Array<double, 6, 1> ratio = total.diagonal().array() / then.diagonal().array();
+    if ((ratio < change && ratio > 1 / change).all()) return static_cast<std::uint32_t>(k);
   }
+  if (epochs_.size() == max_epochs) return static_cast<std::uint32_t>(epochs_.size() - 1);
   const PoseCovariance G = to_origin(T_WI);
   epochs_.push_back(G * total * G.transpose());
   return static_cast<std::uint32_t>(epochs_.size() - 1);
@@ -81,7 +85,7 @@ void MapError::seen(const SE3& T_WI, std::span<const EpochInformation> epochs, c
   for (const EpochInformation& e : epochs) views += (e.A.bottomRightCorner<3, 3>().trace() / all) * G * epochs_[e.epoch] * G.transpose();
   // Each metre is wrong by the same share, so that standard deviations add.
   const PoseCovariance before = at(T_WI);
-  const double sigma = std::sqrt((weak * before * weak.transpose()).bottomRightCorner<3, 3>().trace()), more = scale_error * travelled;
+  const double sigma = std::sqrt(std::max(0.0, (weak * before * weak.transpose()).bottomRightCorner<3, 3>().trace())), more = scale_error * travelled;
   views.bottomRightCorner<3, 3>().diagonal().array() += (2 * sigma + more) * more;
   const PoseCovariance known = PoseCovariance::Identity() - weak;
   const PoseCovariance H = to_origin(T_WI);

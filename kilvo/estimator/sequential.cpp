@@ -62,9 +62,12 @@ void Estimator::process_pending(Time until, std::vector<Output>& out) {
 
 // A scan whose middle is before the image is still being taken: it goes first, if it comes at all.
 bool Estimator::waits_for_scan(Time image, Time until) const {
+  if (ended_) return false;
   const Duration period = from_seconds(1 / robot_.lidar.rate);
   const bool expected = uses(Sensor::lidar) && last_middle_ != Time{} && last_middle_ + period <= image;
-  return expected && until < image + period && image - last_middle_ < 3 * period;
+  const bool has_passed = std::ranges::any_of(
+      pending_, [image](const Pending& p) { return std::holds_alternative<LidarScan>(p.what) && p.middle() > image; });
+  return expected && !has_passed && until < image + 6 * period / 10 && image - last_middle_ < 3 * period;
 }
 
 void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& out) {

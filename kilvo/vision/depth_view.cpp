@@ -33,7 +33,10 @@ Window window_of(const Camera& camera) {
   for (int k = 0; k <= steps; ++k) {
     const double s = static_cast<double>(k) / steps;
     for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(s * w, 0), Eigen::Vector2d(s * w, h), Eigen::Vector2d(0, s * h), Eigen::Vector2d(w, s * h)}) {
-      if (const auto ray = camera.unproject(pixel)) window.take(*ray);
+      const auto ray = camera.unproject(pixel);
+      constexpr float all = 1e6F;  // it sees up to a limit of its own: project() decides
+      if (!ray) return {-all, all, -all, all};
+      window.take(*ray);
     }
   }
   return window;

@@ -68,6 +68,19 @@ double median_of(std::vector<double>& values) {
   return *middle;
 }
 
+// The plane may have been found to lie elsewhere since the observation was made: its patch shows what lies on its own ray.
+Eigen::Vector3d on_own_ray(const Camera& camera, const Observation& o, const VisualFrame& frame, const VisualPoint& point) {
+  const auto ray = camera.unproject(o.pixel.cast<double>());
+  if (!ray) return point.p_W;
+  const SE3 T_WR = frame.T_CW.inverse();
+  const Eigen::Vector3d d = T_WR.R * *ray, n = point.normal_W.cast<double>();
+  const double slope = n.dot(d);
+  constexpr double grazing = 0.1, near = 0.1;  // sine, m
+  if (std::abs(slope) < grazing * d.norm()) return point.p_W;
+  const Eigen::Vector3d p_W = T_WR.p + d * (n.dot(point.p_W - T_WR.p) / slope);
+  return (p_W - point.p_W).norm() < near ? p_W : point.p_W;
+}
+
 }  // namespace
 
 std::optional<PatchView> view_of(const Camera& camera, const SE3& T_CI, const SE3& T_WI, const Eigen::Vector3d& p_W) {
@@ -104,7 +117,7 @@ PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, c
     const Observation& o = map.observation(tracks[i].observation);
     const VisualFrame& frame = map.frame(o.frame);
     Prepared& p = prepared_[i];
-    p.p_W = point.p_W;
+    p.p_W = tracks[i].observation == point.observations[0] ? point.p_W : on_own_ray(camera, o, frame, point);
     p.tau = frame.tau;
     p.frame = o.frame;
     p.depth_variance = static_cast<double>(point.variance) * patches_of_node[point.node];
@@ -146,6 +159,7 @@ PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x)
   const double bias = config_.bias_share * p.tau * brightness + 1e-3;
   out.view = *view;
   out.sums = sums_of(*p.patch, seen, x.tau, p.tau, bias * bias, out.expected_variance);
+  verdict.looked = !out.sums.saturated;
   out.valid = !out.sums.saturated && static_cast<double>(verdict.correlation) > config_.min_correlation;
   return out;
 }

@@ -40,6 +40,7 @@ struct PatchSums {
 class PhotometricModel {
  public:
   struct Verdict {
+    bool looked = false;  // it could be compared
     bool used = false;
     bool moved = false;  // found, but not where it should be
     float correlation = 0;

@@ -79,8 +79,7 @@ std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, con
   const CellGrid grid(camera, config.cell);
   struct Best {
     double worth = 0;
-    std::uint32_t point = 0;
-    Eigen::Vector2d pixel;
+    Track track;
   };
   std::vector<Best> cells(grid.size());
   for (const VoxelKey key : voxels_in_view(map, depth)) {
@@ -97,16 +96,16 @@ std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, con
       const double facing = n.dot(towards);
       if (std::abs(facing) < grazing * towards.norm()) return;
       if (depth.hides(*pixel, p.p_W, facing > 0 ? n : Eigen::Vector3d(-n), p_C.z())) return;
-      best = {worth, id, *pixel};
+      // A point without a usable view would keep others out of its cell for ever.
+      Track track;
+      track.point = id;
+      track.pixel = *pixel;
+      if (choose_observation(view, p, track)) best = {worth, track};
     });
   }
   std::vector<Track> tracks;
   for (const Best& best : cells) {
-    if (best.worth <= 0) continue;
-    Track track;
-    track.point = best.point;
-    track.pixel = best.pixel;
-    if (choose_observation(view, map.point(best.point), track)) tracks.push_back(track);
+    if (best.worth > 0) tracks.push_back(best.track);
   }
   return tracks;
 }

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <memory>
+#include <random>
 
 #include "kilvo/estimator/estimator.hpp"
 #include "lab/settings/settings.hpp"
@@ -132,8 +133,8 @@ TEST_F(Images, BadOnesAreCountedAndCostNothingButThemselves) {
   };
   CameraImage last;
   const std::vector<Case> cases = {
-      {"the same picture again", grey(0)},
-      {"the same picture again", grey(255)},
+      {"frozen", grey(0)},
+      {"frozen", grey(255)},
       {"empty",
        [](CameraImage& i, double t) {
          if (t > 4 && t < 6) i.image = {};
@@ -144,7 +145,7 @@ TEST_F(Images, BadOnesAreCountedAndCostNothingButThemselves) {
          if (t > 4 && t < 6) i.image.height /= 2, i.image.pixels.resize(i.image.pixels.size() / 2);
          return true;
        }},
-      {"the same picture again",
+      {"frozen",
        [&last](CameraImage& i, double t) {
          if (t > 4 && t < 6) i.image = last.image;
          last = i;
@@ -177,6 +178,43 @@ TEST_F(Images, ACameraTurnedByThreeDegreesIsSpokenOf) {
     const Drive d = drive(liv, {}, [&](Robot& r) { r.camera.T_imu_camera.R = SO3::Exp(3 * M_PI / 180 * axis) * r.camera.T_imu_camera.R; });
     EXPECT_THAT(d.statistics.warnings, testing::Contains(HasSubstr("camera.T_imu_camera.R"))) << axis.transpose();
   }
+}
+
+TEST_F(Images, ACoveredLensSaysNothingAndTeachesNothing) {
+  std::mt19937 random(5);
+  const auto covered = [&random](CameraImage& i, double t) {
+    if (t < 4 || t > 5.5) return true;
+    for (std::uint8_t& p : i.image.pixels) p = static_cast<std::uint8_t>(random() % 8);
+    return true;
+  };
+  const Drive d = drive(liv, covered), good = drive(liv);
+  EXPECT_GT(camera_of(d).dropped.at("agrees with nothing"), 10U);
+  EXPECT_TRUE(d.outputs.contains(Modality::li));
+  EXPECT_LT(d.error, 1.5 * good.error + 0.0005);
+}
+
+TEST_F(Images, OfAnyBufferAreReadWithinIt) {
+  const Drive d = drive(liv, [](CameraImage& i, double t) {
+    if (t > 4 && t < 5) i.image.pixels.resize(i.image.pixels.size() / 3);
+    if (t > 6 && t < 7) i.image.channels = 0;
+    return true;
+  });
+  EXPECT_GE(camera_of(d).dropped.at("cut short"), 8U);
+  EXPECT_GE(camera_of(d).dropped.at("neither grey nor colour"), 8U);
+}
+
+TEST_F(Images, WithoutTheLidarAreNotUsed) {
+  Estimator estimator(settings_->robot, settings_->estimator, liv);
+  for (const Measurement& m : walk_) {
+    const double t = simulator_->seconds_of(stamp_of(m));
+    if (std::holds_alternative<LidarScan>(m) && t > 4 && t < 6) continue;
+    for (const Output& o : estimator.push(m)) {
+      const double now = simulator_->seconds_of(o.t);
+      if (now < 4.6 || now > 6) continue;
+      EXPECT_EQ(o.modality, Modality::coast) << now;
+    }
+  }
+  EXPECT_GT(estimator.statistics().sensors[static_cast<std::size_t>(Sensor::camera)].dropped.at("no LiDAR"), 10U);
 }
 
 TEST_F(Images, WithoutAnySweepAreDropped) {
