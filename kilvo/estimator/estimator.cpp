@@ -192,6 +192,9 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   last_sweep_ = start.estimate.t;
   if (uses(Sensor::legs)) last_legs_ = start.estimate.t;  // taken as there until they stay silent
   trajectory_.push(estimate_->t, estimate_->x.pose(), estimate_->x.v);
+  // On the move the first sweeps find the velocity; patches kept before that would be kept at wrong places.
+  constexpr Duration to_settle = std::chrono::seconds(2);
+  images_from_ = start.still ? start.estimate.t : start.estimate.t + to_settle;
   if (!start.still) statistics_.warnings.push_back("the robot did not stand still: started on the move, with wide uncertainties");
   const double norm = start.resting_norm * start.accel_scale;
   if (std::abs(norm - standard_gravity) > 0.1 * standard_gravity) {

@@ -135,6 +135,7 @@ class Estimator {
   MountCheck mount_check_;
   bool mount_is_doubted_ = false, size_is_doubted_ = false;
   int images_in_vain_ = 0;
+  Time images_from_{};  // earlier ones are not used
   std::vector<PointXYZI> seen_W_;      // points of the last sweep
   std::optional<Eigen::Vector3d> last_seen_from_;  // where the last image was taken, m
 

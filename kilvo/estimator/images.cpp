@@ -52,6 +52,7 @@ const char* Estimator::image_fault(const CameraImage& image) {
 void Estimator::process(const CameraImage& image) {
   if (image.t < anchor_.t) return drop(Sensor::camera, "before the state");
   if (replay_.is_blind(image.t, image.t)) return drop(Sensor::camera, "no IMU");
+  if (image.t < images_from_) return drop(Sensor::camera, "before the motion is known");
   if (seen_W_.empty()) return drop(Sensor::camera, "before the first sweep");
   // Vision lives by the surfaces of the LiDAR: without it, nobody can tell what hides what, and images can only drift.
   constexpr int scans = 3;

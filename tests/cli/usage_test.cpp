@@ -51,7 +51,7 @@ TEST(Usage, SensorsThatCannotBeUsedAreRefused) {
   expect_error({"run", "x.bag", "--out", folder / "out", "--config", folder / "robot.yaml", "--sensors", "imu,lidar"}, 2,
                "lidar.topic is missing");
   expect_error({"run", "x.bag", "--out", folder / "out", "--config", folder / "robot.yaml", "--sensors", "camera,imu"}, 2,
-               "camera.topic is missing");
+               "the camera needs the lidar");
 }
 
 TEST(Usage, HelpAndVersionGoToStdout) {
