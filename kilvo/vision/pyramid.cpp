@@ -27,12 +27,16 @@ void blend_columns(const std::uint16_t* __restrict in, std::uint8_t* __restrict 
 GreyImage to_grey(const Image& image) {
   if (image.channels != 3) return {image.width, image.height, image.pixels};
   GreyImage out{image.width, image.height, std::vector<std::uint8_t>(image.pixels.size() / 3)};
-  const std::uint8_t* __restrict in = image.pixels.data();
+  const std::uint8_t* in = image.pixels.data();
   std::uint8_t* __restrict grey = out.pixels.data();
   const std::size_t count = out.pixels.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    grey[i] = static_cast<std::uint8_t>((77 * in[3 * i] + 150 * in[3 * i + 1] + 29 * in[3 * i + 2] + 128) >> 8);  // 0.299 0.587 0.114
+  // 0.299 0.587 0.114
+  const auto mix = [](const std::uint8_t* p) { return static_cast<std::uint8_t>((77U * p[0] + 150U * p[1] + 29U * p[2] + 128U) >> 8); };
+  std::size_t i = 0;
+  for (; i + 8 <= count; i += 8, in += 24) {
+    for (std::size_t k = 0; k < 8; ++k) grey[i + k] = mix(in + 3 * k);
   }
+  for (; i < count; ++i, in += 3) grey[i] = mix(in);
   return out;
 }
 
