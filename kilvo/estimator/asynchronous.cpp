@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "kilvo/estimator/estimator.hpp"
+#include "kilvo/estimator/silence.hpp"
 #include "kilvo/estimator/stopwatch.hpp"
 
 namespace kilvo {
@@ -14,9 +15,6 @@ constexpr Duration longest_replay = std::chrono::seconds(2);
 
 // Legs without an IMU for longer than this are no odometry, s.
 constexpr double longest_held_imu = 0.1;
-
-// theta_s of Eq. 16: a sensor that has been silent for longer is lost.
-Duration silence(double rate, double periods, Duration least) { return std::max(least, from_seconds(periods / rate)); }
 
 }  // namespace
 

@@ -109,7 +109,7 @@ std::vector<Output> Estimator::finish() {
     if (last_output_) replay_.advance(*estimate_, std::max(estimate_->t, *last_output_ + Duration(1000)), trajectory_);
     emit(out);
   }
-  for (const Pending& p : pending_) drop(std::holds_alternative<LidarScan>(p.what) ? Sensor::lidar : Sensor::camera, "no IMU");
+  for (const Pending& p : pending_) drop(p.sensor(), "no IMU");
   pending_.clear();
   for (const Measurement& m : before_start_) drop(sensor_of(m), "before the start");
   before_start_.clear();
@@ -159,7 +159,7 @@ void Estimator::handle(Measurement& m, std::vector<Output>& out) {
 
 void Estimator::bound_pending() {
   if (pending_.size() <= max_pending) return;
-  drop(std::holds_alternative<LidarScan>(pending_.front().what) ? Sensor::lidar : Sensor::camera, "no IMU");
+  drop(pending_.front().sensor(), "no IMU");
   pending_.pop_front();
 }
 

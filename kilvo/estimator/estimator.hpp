@@ -115,6 +115,7 @@ class Estimator {
   struct Pending {
     std::variant<LidarScan, CameraImage> what;
     Time begin, end;  // of the scan; the image's stamp
+    Sensor sensor() const { return std::holds_alternative<LidarScan>(what) ? Sensor::lidar : Sensor::camera; }
     Time middle() const { return begin + (end - begin) / 2; }
   };
   std::deque<Pending> pending_;  // by end

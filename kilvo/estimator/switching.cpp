@@ -5,13 +5,11 @@
 #include <string_view>
 
 #include "kilvo/estimator/estimator.hpp"
+#include "kilvo/estimator/silence.hpp"
 #include "kilvo/filter/update.hpp"
 
 namespace kilvo {
 namespace {
-
-// theta_s of Eq. 16: a sensor that has been silent for longer is lost.
-Duration silence(double rate, double periods, Duration least) { return std::max(least, from_seconds(periods / rate)); }
 
 // After an outage so many sweeps in a row must agree with what was expected before the map grows again.
 constexpr int consistent_sweeps = 3;

@@ -37,6 +37,19 @@ Eigen::Matrix<double, 3, at::size> numeric_jacobian(const State& x, F residual) 
   return J;
 }
 
+Estimate sure_of_itself() {
+  Estimate e;
+  e.P.diagonal().setConstant(1e-6);
+  return e;
+}
+
+LegStep both_stand() {
+  LegStep step;
+  step.dt = 0.001;
+  for (Stance& foot : step.foot) foot.used = true;
+  return step;
+}
+
 TEST(LegMeasurements, TheVelocityRowIsTheDerivativeOfItsResidual) {
   test::Random random(1);
   for (int i = 0; i < 30; ++i) {
@@ -114,12 +127,9 @@ TEST(LegMeasurements, TheModelHoldsTwelveRowsForTwoFeetAndEachFootHasItsOwnColum
 }
 
 TEST(LegMeasurements, AFootThatIsFarFasterThanTheStateAllowsIsLeftOutAndTheOtherStays) {
-  Estimate e;
-  e.P.diagonal().setConstant(1e-6);
+  Estimate e = sure_of_itself();
   const LegConfig config;
-  LegStep step;
-  step.dt = 0.001;
-  for (Stance& foot : step.foot) foot.used = true;
+  LegStep step = both_stand();
   step.foot[0].point.v = {2, 0, 0};
   LegModel model(step, Eigen::Vector3d::Zero(), config);
   const Rows<LegModel::max_leg_rows> rows = model(e.x, e.P);
@@ -134,12 +144,9 @@ TEST(LegMeasurements, AFootThatIsFarFasterThanTheStateAllowsIsLeftOutAndTheOther
 
 // Eq. 8 loosens what moves, but no foot can loosen its own gate.
 TEST(LegMeasurements, TheGateDoesNotOpenForAFootThatIsLooseBecauseItMoves) {
-  Estimate e;
-  e.P.diagonal().setConstant(1e-6);
+  Estimate e = sure_of_itself();
   const LegConfig config;
-  LegStep step;
-  step.dt = 0.001;
-  for (Stance& foot : step.foot) foot.used = true;
+  LegStep step = both_stand();
   LegModel model(step, Eigen::Vector3d::Zero(), config);
   step.foot[0].looseness = 100;
   step.foot[0].point.v = {0.25, 0, 0};

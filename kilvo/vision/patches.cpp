@@ -22,16 +22,6 @@ Corner corner_at(const Eigen::Vector2d& pixel, int level) {
   return {x, y, {c.x() - x, c.y() - y}};
 }
 
-float bilinear(const std::array<std::uint8_t, Patch::size * Patch::size>& pixels, float x, float y) {
-  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  const float a = x - static_cast<float>(ix), b = y - static_cast<float>(iy);
-  const std::uint8_t* upper = pixels.data() + iy * Patch::size + ix;
-  const std::uint8_t* lower = upper + Patch::size;
-  const float top = static_cast<float>(upper[0]) + a * static_cast<float>(upper[1] - upper[0]);
-  const float bottom = static_cast<float>(lower[0]) + a * static_cast<float>(lower[1] - lower[0]);
-  return top + b * (bottom - top);
-}
-
 }  // namespace
 
 std::optional<Patch> cut_patch(std::span<const GreyImage> pyramid, const Eigen::Vector2d& pixel) {
@@ -84,7 +74,7 @@ std::optional<Template> warp(const Observation& from, const Eigen::Matrix2d& A, 
   std::array<float, wide * wide> values;
   for (int j = 0; j < wide; ++j) {
     Eigen::Vector2f at = centre - reach * step.col(0) + (static_cast<float>(j) - reach) * step.col(1);
-    for (int i = 0; i < wide; ++i, at += step.col(0)) values[static_cast<std::size_t>(j * wide + i)] = bilinear(pixels, at.x(), at.y());
+    for (int i = 0; i < wide; ++i, at += step.col(0)) values[static_cast<std::size_t>(j * wide + i)] = sample(pixels.data(), Patch::size, at.x(), at.y());
   }
   Template out;
   for (int j = 0; j < Template::size; ++j) {

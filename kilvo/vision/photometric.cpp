@@ -129,6 +129,7 @@ PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, c
   int coarsest = 0;
   while (coarsest + 1 < std::min<int>(Patch::levels, static_cast<int>(pyramid.size())) && spread > reach * (1 << coarsest)) ++coarsest;
   for (int level = coarsest; level >= 0; --level) schedule_.push_back(level);
+  prepare(schedule_.front());
 }
 
 void PhotometricModel::prepare(int level) {
@@ -282,12 +283,10 @@ std::optional<double> PhotometricModel::exposure_at(const State& x) const {
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     const Prepared& p = prepared_[i];
     const auto view = view_of(camera_, T_CI_, x.pose(), p.p_W);
-    if (!view || !camera_.sees(view->pixel, 2 * border)) continue;
-    const auto patch = warp(map_.observation(tracks_[i].observation), tracks_[i].A, 0);
-    if (!patch) continue;
+    if (!p.patch || !view || !camera_.sees(view->pixel, 2 * border * (1 << level_))) continue;
     Values seen;
-    sample_patch(pyramid_[0], view->pixel.cast<float>(), seen);
-    const float here = mean_of(seen), there = mean_of(patch->value);
+    sample_patch(pyramid_[static_cast<std::size_t>(level_)], at_level(view->pixel, level_).cast<float>(), seen);
+    const float here = mean_of(seen), there = mean_of(p.patch->value);
     constexpr float dark = 8, light = 240;
     if (here > dark && here < light && there > dark && there < light) ratios.push_back(p.tau * static_cast<double>(there / here));
   }

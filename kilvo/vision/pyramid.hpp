@@ -34,12 +34,12 @@ inline Eigen::Vector2d at_level(const Eigen::Vector2d& pixel, int level) {
   return scale * (pixel.array() + 0.5).matrix() - Eigen::Vector2d(0.5, 0.5);
 }
 
-/// Bilinear; (x, y) must be at least 0 and at most (width - 1, height - 1) less a hair.
-inline float sample(const GreyImage& image, float x, float y) {
+/// Bilinear, in rows of `width` pixels; (x, y) must be at least 0 and at most (width - 1, height - 1) less a hair.
+inline float sample(const std::uint8_t* pixels, int width, float x, float y) {
   const int ix = static_cast<int>(x), iy = static_cast<int>(y);
   const float a = x - static_cast<float>(ix), b = y - static_cast<float>(iy);
-  const std::uint8_t* upper = image.row(iy) + ix;
-  const std::uint8_t* lower = upper + image.width;
+  const std::uint8_t* upper = pixels + iy * width + ix;
+  const std::uint8_t* lower = upper + width;
   const float top = static_cast<float>(upper[0]) + a * static_cast<float>(upper[1] - upper[0]);
   const float bottom = static_cast<float>(lower[0]) + a * static_cast<float>(lower[1] - lower[0]);
   return top + b * (bottom - top);

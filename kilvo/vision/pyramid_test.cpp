@@ -74,7 +74,7 @@ TEST(Pyramid, EachLevelShowsARampWhereAtLevelSays) {
   for (int level = 0; level < 4; ++level) {
     for (int i = 0; i < 200; ++i) {
       const Eigen::Vector2d pixel(random.uniform(40, 280), random.uniform(40, 216)), there = at_level(pixel, level);
-      const auto seen = sample(levels[static_cast<std::size_t>(level)], static_cast<float>(there.x()), static_cast<float>(there.y()));
+      const auto seen = sample(levels[static_cast<std::size_t>(level)].pixels.data(), levels[static_cast<std::size_t>(level)].width, static_cast<float>(there.x()), static_cast<float>(there.y()));
       EXPECT_NEAR(seen, ramp(pixel), 0.75) << "level " << level;  // each level rounds; half a pixel of level 3 would be 2
     }
   }
@@ -147,11 +147,11 @@ TEST(Grey, AGreyImageStaysAsItIs) {
 
 TEST(Sample, IsBilinearBetweenPixels) {
   const GreyImage image{3, 2, {10, 20, 60, 30, 80, 0}};
-  EXPECT_FLOAT_EQ(sample(image, 0, 0), 10);
-  EXPECT_FLOAT_EQ(sample(image, 0.25F, 0), 12.5F);
-  EXPECT_FLOAT_EQ(sample(image, 0, 0.5F), 20);
-  EXPECT_FLOAT_EQ(sample(image, 0.5F, 0.5F), 35);
-  EXPECT_FLOAT_EQ(sample(image, 1.5F, 0.5F), 40);
+  EXPECT_FLOAT_EQ(sample(image.pixels.data(), image.width, 0, 0), 10);
+  EXPECT_FLOAT_EQ(sample(image.pixels.data(), image.width, 0.25F, 0), 12.5F);
+  EXPECT_FLOAT_EQ(sample(image.pixels.data(), image.width, 0, 0.5F), 20);
+  EXPECT_FLOAT_EQ(sample(image.pixels.data(), image.width, 0.5F, 0.5F), 35);
+  EXPECT_FLOAT_EQ(sample(image.pixels.data(), image.width, 1.5F, 0.5F), 40);
 }
 
 }  // namespace
