@@ -43,7 +43,9 @@ int parse_and_do(const std::vector<std::string>& words) {
       "Each verb has its own: kilvo VERB --help\nExit codes: 0 done, 1 the run failed, 2 wrong usage or configuration, 3 unusable input");
   check_words(words, program);
   try {
-    program.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+    std::vector<std::string> reversed = with_values(words);
+    std::ranges::reverse(reversed);
+    program.parse(reversed);
   } catch (const CLI::Success& asked) {  // --help, --version
     return program.exit(asked);
   } catch (const CLI::ParseError& error) {

@@ -11,8 +11,8 @@ bool is_large(const Measurement& m) { return std::holds_alternative<LidarScan>(m
 
 }  // namespace
 
-ReadAhead::ReadAhead(MeasurementSource& source, std::function<double()> progress, bool threaded)
-    : source_(source), source_progress_(std::move(progress)), queue_(most_batches) {
+ReadAhead::ReadAhead(MeasurementSource& source, std::function<double()> progress, std::function<Time()> arrival, bool threaded)
+    : source_(source), source_progress_(std::move(progress)), source_arrival_(std::move(arrival)), queue_(most_batches) {
   if (threaded) thread_ = std::thread([this] { read_all(); });
 }
 
@@ -26,7 +26,7 @@ void ReadAhead::read_all() {
         auto measurement = source_.next();
         if (!measurement) break;
         full = is_large(*measurement) || batch.measurements.size() + 1 >= most_in_batch;
-        batch.measurements.push_back(*std::move(measurement));
+        batch.measurements.emplace_back(*std::move(measurement), source_arrival_());
       }
       batch.progress = source_progress_();
       if (batch.measurements.empty()) break;
@@ -42,6 +42,7 @@ std::optional<Measurement> ReadAhead::next() {
   if (!thread_.joinable()) {
     auto measurement = source_.next();
     progress_ = source_progress_();
+    arrived_ = source_arrival_();
     return measurement;
   }
   if (taken_ == batch_.measurements.size()) {
@@ -54,7 +55,9 @@ std::optional<Measurement> ReadAhead::next() {
     progress_ = batch_.progress;
     taken_ = 0;
   }
-  return std::move(batch_.measurements[taken_++]);
+  auto& [measurement, arrived] = batch_.measurements[taken_++];
+  arrived_ = arrived;
+  return std::move(measurement);
 }
 
 void ReadAhead::stop() {

@@ -52,7 +52,6 @@ void Recap::add(const Output& output) {
   }
   last_ = now;
   ++outputs_;
-  if (output.is_sweep) ++sweeps_;
   if (output.contacts) count_touchdowns(*output.contacts);
   judge(output);
 }

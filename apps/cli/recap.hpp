@@ -38,6 +38,7 @@ struct StampedState {
 class Recap {
  public:
   void add(const Output& output);
+  void count_sweep() { ++sweeps_; }
 
   StageClock stages;
   std::map<std::string, std::uint64_t> degraded;  // sweeps and images that said too little, by sense

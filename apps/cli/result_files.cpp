@@ -18,25 +18,39 @@ void append(std::string& line, const Eigen::Vector3d& v) {
 
 }  // namespace
 
-ResultFiles::ResultFiles(const std::filesystem::path& folder)
+ResultFiles::ResultFiles(const std::filesystem::path& folder, double smooth_time)
     : odometry_(folder / "odometry.tum"),
+      smooth_(folder / "odometry_smooth.tum"),
       sweeps_(folder / "sweeps.tum"),
       states_(folder / "states.csv", state_columns),
       modality_(folder / "modality.csv", "t,modality,cause"),
       timing_(folder / "timing.csv", "t,stage,microseconds"),
-      folder_(folder) {}
+      folder_(folder),
+      smoothing_(smooth_time) {}
 
 void ResultFiles::write(const Output& output) {
-  const lab::StampedPose pose{output.t, output.x.pose()};
-  odometry_.write(pose);
-  if (output.is_sweep) sweeps_.write(pose);
+  write_state(output);
+  write_sweep(output);
+}
+
+void ResultFiles::write_state(const Output& output) {
+  odometry_.write({output.t, output.x.pose()});
+  smooth_.write({output.t, smoothing_.add(output)});
   const bool without_lidar = output.modality == Modality::ki || output.modality == Modality::coast;
-  if (output.is_sweep || (without_lidar && (!last_state_ || output.t - *last_state_ >= state_period))) write_state(output);
+  if (without_lidar && !output.is_sweep && (!last_state_ || output.t - *last_state_ >= state_period)) write_full_state(output);
   if (output.modality != last_modality_) write_modality(output);
-  if (output.is_sweep || output.is_image) write_stages(output);
   if (output.contacts) write_contacts(output);
-  write_indicators(output);
   recap_.add(output);
+}
+
+void ResultFiles::write_sweep(const Output& output) {
+  if (output.is_sweep) {
+    sweeps_.write({output.t, output.x.pose()});
+    write_full_state(output);
+    recap_.count_sweep();
+  }
+  if (output.is_sweep || output.is_image) write_stages(output);
+  write_indicators(output);
 }
 
 void ResultFiles::write_contacts(const Output& output) {
@@ -72,7 +86,8 @@ void ResultFiles::write_indicators(const Output& output) {
   recap_.degraded["visual"] += visual ? 1 : 0;
 }
 
-void ResultFiles::write_state(const Output& output) {
+void ResultFiles::write_full_state(const Output& output) {
+  if (last_state_ && output.t <= *last_state_) return;
   const State& x = output.x;
   std::string line;
   lab::append_seconds(line, output.t);
@@ -110,6 +125,7 @@ void ResultFiles::write_stages(const Output& output) {
 
 void ResultFiles::close() {
   odometry_.close();
+  smooth_.close();
   sweeps_.close();
   states_.close();
   modality_.close();

@@ -7,6 +7,7 @@
 #include "apps/cli/csv_file.hpp"
 #include "apps/cli/recap.hpp"
 #include "kilvo/estimator/output.hpp"
+#include "kilvo/estimator/smooth_odometry.hpp"
 #include "lab/evaluation/trajectory_file.hpp"
 
 namespace kilvo::cli {
@@ -14,23 +15,28 @@ namespace kilvo::cli {
 class ResultFiles {
  public:
   /// Throws lab::OutputError or lab::TrajectoryOutputError, as do write() and close().
-  explicit ResultFiles(const std::filesystem::path& folder);
+  ResultFiles(const std::filesystem::path& folder, double smooth_time);
 
+  /// Of an estimator: everything that it says.
   void write(const Output& output);
+  /// Of a live runner, whose states and sweeps come apart.
+  void write_state(const Output& output);
+  void write_sweep(const Output& output);
   void close();
 
   const Recap& recap() const { return recap_; }
 
  private:
-  void write_state(const Output& output);
+  void write_full_state(const Output& output);
   void write_modality(const Output& output);
   void write_stages(const Output& output);
   void write_contacts(const Output& output);
   void write_indicators(const Output& output);
 
-  lab::TumWriter odometry_, sweeps_;
+  lab::TumWriter odometry_, smooth_, sweeps_;
   CsvFile states_, modality_, timing_;
   std::filesystem::path folder_;
+  SmoothOdometry smoothing_;
   std::optional<CsvFile> contacts_;     // from the first leg sample on
   std::optional<CsvFile> degradation_;  // from the first sweep or image on
   std::optional<Modality> last_modality_;

@@ -17,7 +17,8 @@ struct RunWords {
   RunOptions options;
   std::string out, map, config;
   std::optional<std::string> sensors;
-  std::vector<std::string> drops;
+  std::vector<std::string> drops, delays;
+  std::optional<double> realtime;
   bool no_map = false;
   int threads = 0;  // 0: as many as there are cores
 };
@@ -28,6 +29,10 @@ int run(RunWords words) {
   if (!words.config.empty()) options.config = words.config;
   if (words.sensors) options.sensors = parse_sensors(*words.sensors);
   for (const std::string& text : words.drops) options.failures.push_back(parse_drop(text));
+  for (const std::string& text : words.delays) options.failures.push_back(parse_delay(text));
+  options.realtime = words.realtime;
+  if (options.realtime && !(*options.realtime > 0 && *options.realtime <= 1000))
+    throw UsageError("--realtime must be a speed above 0 and at most 1000");
   if (words.no_map && !words.map.empty()) throw UsageError("--map and --no-map exclude each other");
   if (!words.map.empty()) options.map = words.map;
   options.with_map = !words.no_map;
@@ -57,6 +62,11 @@ void add_run(CLI::App& program, Action& chosen) {
   verb->add_option("--drop", words->drops,
                    "leave out a sensor's messages between two times (lidar:10-16; lidar:10- to the end), repeatable")
       ->type_name("SENSOR:T0-T1")
+      ->allow_extra_args(false);
+  verb->add_option("--realtime", words->realtime, "play it through the live runner, so many times as fast as it was recorded (1)")
+      ->type_name("[SPEED]");
+  verb->add_option("--delay", words->delays, "let a sensor's messages arrive so many milliseconds later (camera:50), repeatable")
+      ->type_name("SENSOR:MS")
       ->allow_extra_args(false);
   verb->add_option("--start", options.start, "begin this many seconds into the recording")->type_name("S");
   verb->add_option("--duration", options.duration, "end after this many seconds")->type_name("S");

@@ -8,12 +8,14 @@
 #include "apps/cli/interrupt.hpp"
 #include "apps/cli/map_keeper.hpp"
 #include "apps/cli/output_folder.hpp"
+#include "apps/cli/pace.hpp"
 #include "apps/cli/progress.hpp"
 #include "apps/cli/read_ahead.hpp"
 #include "apps/cli/result_files.hpp"
 #include "apps/cli/sensor_choice.hpp"
 #include "apps/cli/shipped_config.hpp"
 #include "apps/cli/summary.hpp"
+#include "apps/live/live_runner.hpp"
 #include "kilvo/estimator/estimator.hpp"
 #include "lab/mapping/ply.hpp"
 
@@ -76,14 +78,14 @@ class Run {
         source_(options.input, recording_options(options, settings_, choice.used)),
         failing_(source_, options.failures, source_.begin(), [this] { return source_.recorded(); }),
         estimator_(make_estimator(settings_, choice.used)),
-        map_(settings_.mapping, options.threads > 1),
-        files_(options.out),
+        map_(settings_.mapping, options.threads > 1 || options.realtime),
+        files_(options.out, settings_.estimator.smooth_time),
         progress_(Progress::style_for(options.quiet)) {
     if (!options.quiet) tell_start(facts_, source_, options.no_deskew);
   }
 
   int all() {
-    const bool interrupted = replay();
+    const bool interrupted = options_.realtime ? replay_live() : replay();
     progress_.finish();
     files_.close();
     facts_.failure = failure(interrupted);
@@ -101,7 +103,7 @@ class Run {
   // True when the user stopped it.
   bool replay() {
     ReadAhead input(
-        failing_, [this] { return source_.progress(); }, options_.threads > 1);
+        failing_, [this] { return source_.progress(); }, [this] { return failing_.arrived(); }, options_.threads > 1);
     bool interrupted = false;
     while (auto measurement = input.next()) {
       require_legs(*measurement);
@@ -115,6 +117,30 @@ class Run {
     return interrupted;
   }
 
+  bool replay_live() {
+    live::LiveRunner runner(estimator_, settings_.robot, settings_.estimator, as_flags(facts_.sensors), settings_.live,
+                            {[this](Output output) { files_.write_state(output); },
+                             [this](Output output) {
+                               files_.write_sweep(output);
+                               keep_map(output);
+                             }});
+    ReadAhead input(
+        failing_, [this] { return source_.progress(); }, [this] { return failing_.arrived(); }, true);
+    Pace pace(*options_.realtime);
+    bool interrupted = false;
+    while (auto measurement = input.next()) {
+      require_legs(*measurement);
+      interrupted = !pace.wait_for(input.arrived(), interrupt_);
+      if (interrupted) break;
+      runner.push(*std::move(measurement));
+      progress_.update(input.progress(), [&runner] { return runner.waiting_for(); });
+    }
+    input.stop();
+    runner.stop();
+    facts_.live = runner.statistics();
+    return interrupted;
+  }
+
   // The first message of the legs shows whether it is of the robot in the configuration.
   void require_legs(const Measurement& m) {
     const auto* joints = std::get_if<JointSample>(&m);
@@ -125,10 +151,14 @@ class Run {
   void keep(std::vector<Output> outputs) {
     for (Output& output : outputs) {
       files_.write(output);
-      if (!options_.with_map) continue;
-      if (output.is_sweep) map_.add(std::move(output.points_W));
-      if (!output.coloured.empty()) map_.colour(std::move(output.coloured));
+      keep_map(output);
     }
+  }
+
+  void keep_map(Output& output) {
+    if (!options_.with_map) return;
+    if (output.is_sweep) map_.add(std::move(output.points_W));
+    if (!output.coloured.empty()) map_.colour(std::move(output.coloured));
   }
 
   std::string progress_note() const {
@@ -185,8 +215,10 @@ int run_recording(const RunOptions& options) {
   if (options.map) prepare_folder(std::filesystem::absolute(*options.map).parent_path());
   SensorChoice choice = choose_sensors(options.sensors, settings, config.string(), options.input);
   lab::require_complete(settings, choice.used);
+  // On a robot the other cores are for others.
+  if (options.realtime && !settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
   // Reading and the map keep about one core busy.
-  if (!settings.given.contains("estimator.threads")) settings.estimator.threads = std::max(1, options.threads - 1);
+  if (!settings.given.contains("estimator.threads")) settings.estimator.threads = options.realtime ? 1 : std::max(1, options.threads - 1);
   facts.input = options.input;
   facts.config_file = config.string();
   facts.sensors = choice.used;

@@ -76,6 +76,17 @@ std::vector<Sensor> parse_sensors(const std::string& list) {
   return {out.begin(), out.end()};
 }
 
+lab::Failure parse_delay(const std::string& text) {
+  const UsageError wrong(fmt::format("--delay {}: must be SENSOR:MS in milliseconds, as in camera:50", text));
+  const auto colon = text.find(':');
+  if (colon == std::string::npos) throw wrong;
+  std::string_view rest = std::string_view(text).substr(colon + 1);
+  const auto milliseconds = take_seconds(rest);
+  constexpr double most = 60000;
+  if (!milliseconds || !rest.empty() || *milliseconds > most) throw wrong;
+  return {.kind = lab::FailureKind::delay, .sensor = parse_sensor(text.substr(0, colon)), .amount = 1e-3 * *milliseconds};
+}
+
 lab::Failure parse_drop(const std::string& text) {
   const UsageError wrong(fmt::format("--drop {}: must be SENSOR:T0-T1 in seconds, as in lidar:10-16, or lidar:10- (to the end)", text));
   const std::size_t colon = text.find(':');

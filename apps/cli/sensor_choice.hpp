@@ -20,6 +20,9 @@ std::vector<Sensor> parse_sensors(const std::string& list);
 /// "lidar:10-16", "lidar:10-" (to the end). Throws UsageError.
 lab::Failure parse_drop(const std::string& text);
 
+/// "camera:50": its messages come 50 ms later. Throws UsageError.
+lab::Failure parse_delay(const std::string& text);
+
 struct SensorChoice {
   std::vector<Sensor> used;
   std::vector<std::string> warnings;  // what is configured and not there

@@ -94,6 +94,30 @@ Json stages_json(const Recap& recap) {
   return out;
 }
 
+// Of the live runner: how soon it answered, and what it had to give up for that.
+void add_live(Json& json, const RunFacts& facts) {
+  const live::LiveStatistics& live = *facts.live;
+  const auto ms = [](double seconds) { return std::round(1e6 * seconds) / 1e3; };
+  json["latency_ms"] = {{"p50", ms(live.latency.quantile(0.5))},
+                        {"p99", ms(live.latency.quantile(0.99))},
+                        {"p99_9", ms(live.latency.quantile(0.999))},
+                        {"max", ms(live.latency.max())},
+                        {"n", live.latency.count()}};
+  json["deadline_misses"] = live.deadline_misses;
+  json["correction_ms"] = {{"p50", ms(live.correction.quantile(0.5))},
+                           {"p99", ms(live.correction.quantile(0.99))},
+                           {"max", ms(live.correction.max())},
+                           {"n", live.correction.count()}};
+  Json drops = Json::object();
+  for (const Sensor s : facts.sensors) drops[name_of(s)] = live.dropped[static_cast<std::size_t>(s)];
+  drops["outputs"] = live.dropped_outputs;
+  json["queue_drops"] = drops;
+  json["queue_depth"] = live.deepest;
+  Json cpu = Json::object();
+  for (const auto& [thread, seconds] : live.cpu_seconds) cpu[thread] = facts.wall_seconds > 0 ? tenths(100 * seconds / facts.wall_seconds) : 0;
+  json["cpu_percent"] = cpu;
+}
+
 // A setting may hold any bytes; a summary is UTF-8.
 Json config_json(const lab::Settings& settings) {
   std::string text = lab::settings_json(settings);
@@ -109,6 +133,7 @@ std::vector<std::string> all_warnings(const RunFacts& facts, const lab::Recordin
   std::vector<std::string> out = facts.warnings;
   for (const std::string& text : source.warnings()) out.push_back(text);
   out.insert(out.end(), statistics.warnings.begin(), statistics.warnings.end());
+  if (facts.live) out.insert(out.end(), facts.live->warnings.begin(), facts.live->warnings.end());
   return out;
 }
 
@@ -139,6 +164,7 @@ std::string summary_json(const RunFacts& facts, const lab::Settings& settings, c
   json["start_to_end_m"] = recap.start_to_end();
   json["stage_us"] = stages_json(recap);
   json["mean_ms_per_frame"] = recap.sweeps() == 0 ? 0 : recap.stages.total() * 1e-3 / static_cast<double>(recap.sweeps());
+  if (facts.live) add_live(json, facts);
   json["data_seconds"] = recap.seconds();
   json["wall_seconds"] = facts.wall_seconds;
   json["real_time_factor"] = facts.wall_seconds > 0 ? recap.seconds() / facts.wall_seconds : 0;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/cli/recap.hpp"
+#include "apps/live/live_runner.hpp"
 #include "kilvo/estimator/output.hpp"
 #include "lab/recordings/recording_source.hpp"
 #include "lab/settings/settings.hpp"
@@ -22,6 +23,7 @@ struct RunFacts {
   std::array<std::uint64_t, sensor_count> withheld{};  // messages, by Sensor: what the user asked to drop
   double wall_seconds = 0;
   std::size_t map_points = 0;
+  std::optional<live::LiveStatistics> live;
 };
 
 /// All warnings of a run: the choice of sensors, the recording, the estimator.

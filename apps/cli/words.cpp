@@ -1,6 +1,7 @@
 #include "apps/cli/words.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <fmt/core.h>
 
 #include "apps/cli/exit_code.hpp"
@@ -30,7 +31,22 @@ void check_option(const std::string& word, const CLI::App& app) {
   throw UsageError(fmt::format("{}: no option '{}', nearest is '{}'", app.get_name(), name, lab::nearest(name, options)));
 }
 
+// An option whose value may be left out takes the next word only if that is one.
+bool is_number(const std::string& word) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc() && end == word.data() + word.size();
+}
+
 }  // namespace
+
+std::vector<std::string> with_values(std::vector<std::string> words) {
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i] != "--realtime" || (i + 1 < words.size() && is_number(words[i + 1]))) continue;
+    words[i] += "=1";
+  }
+  return words;
+}
 
 void check_words(const std::vector<std::string>& words, const CLI::App& program) {
   const CLI::App* app = &program;

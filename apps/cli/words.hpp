@@ -7,6 +7,9 @@
 
 namespace kilvo::cli {
 
+/// Options that were given without the value that they may have, with it.
+std::vector<std::string> with_values(std::vector<std::string> words);
+
 /// Throws UsageError at the first word that is no verb or no option of its verb.
 void check_words(const std::vector<std::string>& words, const CLI::App& program);
 

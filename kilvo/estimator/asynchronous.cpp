@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "kilvo/estimator/estimator.hpp"
+#include "kilvo/estimator/footfall.hpp"
 #include "kilvo/estimator/silence.hpp"
 #include "kilvo/estimator/stopwatch.hpp"
 
@@ -12,9 +13,6 @@ namespace {
 
 // Without sweeps nothing older than this will be replayed.
 constexpr Duration longest_replay = std::chrono::seconds(2);
-
-// Legs without an IMU for longer than this are no odometry, s.
-constexpr double longest_held_imu = 0.1;
 
 }  // namespace
 
@@ -29,25 +27,21 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   calm_.add(s);
   if (s.t < closed_.t) return;
   if (last_legs_ && health_.is_frozen(Sensor::legs)) lose_legs(s.t);
-  if (last_legs_ && heard - *last_legs_ > silence(robot_.legs.rate, 5, std::chrono::milliseconds(50))) lose_legs(s.t);
+  if (last_legs_ && heard - *last_legs_ > silence_of_legs(robot_.legs.rate)) lose_legs(s.t);
   if (!pending_.empty() && pending_.front().end <= s.t) {
     estimate_ = closed_;  // should all of it wait, or be dropped
     process_pending(s.t, out);
     closed_ = *estimate_;
   }
   Stopwatch watch;
-  replay_.advance(closed_, s.t, trajectory_);
+  replay_.advance(closed_, s.t, &trajectory_);
   estimate_ = closed_;
   closing_us_ = last_legs_ ? closing_us_ + watch.lap_us() : 0;
   keep_finite();
   if (s.t - anchor_.t > longest_replay && pending_.empty()) settle(closed_);
   choose_modality(s.t);
   stand(s);
-  // While the legs are used their samples carry the outputs, unless one is overdue.
-  constexpr double overdue = 2.5;
-  const bool waits =
-      last_legs_ && s.t - *last_legs_ < std::max(from_seconds(overdue / robot_.legs.rate), from_seconds(overdue * leg_period_));
-  if (!waits) emit(out);
+  if (!last_legs_ || are_legs_overdue(s.t - *last_legs_, robot_.legs.rate, leg_period_)) emit(out);
 }
 
 // On the legs alone a wrong velocity makes standing feet look as if they moved, so that they are not used, and nothing mends it. No flight
@@ -68,7 +62,7 @@ void Estimator::keep_a_foothold(const LegStep& step, const std::array<bool, 2>& 
 void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   Stopwatch watch;
   if (s.t < estimate_->t || !replay_.has_imu()) return drop(Sensor::legs, "before the state");
-  if (to_seconds(s.t - replay_.newest_imu().t) > std::max(longest_held_imu, 5 / robot_.imu.rate)) return drop(Sensor::legs, "no IMU");
+  if (to_seconds(s.t - replay_.newest_imu().t) > longest_held_imu(robot_.imu.rate)) return drop(Sensor::legs, "no IMU");
   if (recovery_.imu_lost) return drop(Sensor::legs, "no IMU");
   if (!legs_may_return(s.t)) return drop(Sensor::legs, "not calm yet");
   auto known = kinematics_->feet(s);
@@ -79,28 +73,19 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   last_legs_ = s.t;
 
   replay_.predict_to(*estimate_, s.t, nullptr);
-  const State& x = estimate_->x;
-  const Eigen::Vector3d omega = replay_.newest_imu().gyro - x.bg;
-  const double before_us = watch.lap_us();
-  const double sigma_v = std::sqrt(std::max(0.0, estimate_->P.block<3, 3>(at::v, at::v).trace() / 3));
-  const Contacts& contacts = contacts_.update(feet, x, omega, replay_.newest_imu().accel - x.ba, sigma_v, &map_);
-  const double contact_us = watch.lap_us();
   // Beside a LiDAR the ground under a foot tells nothing new of the height, but how the feet stand on it.
   const auto ground = modality_ == Modality::ki ? StanceTracker::Ground::use : StanceTracker::Ground::learn;
-  const LegStep step = stances_.step(feet, contacts_, x, omega, sigma_v, &map_, ground);
-  replay_.add(step);
-  const std::array<bool, 2> passed = replay_.apply(*estimate_, step);
-  stances_.judge(step, passed);
+  const auto [step, passed, contact_us] = take_step(feet, *estimate_, contacts_, stances_, replay_, &map_, ground);
   if (!passed[0] && !passed[1]) ++statistics_.unsupported;
   keep_finite();
   // A sample of the IMU's own time belongs before the interval that begins there.
   if (s.t == anchor_.t) anchor_ = *estimate_;
   if (s.t == closed_.t) closed_ = *estimate_;
-  const double after_us = watch.lap_us();
+  const double kinematic_us = watch.lap_us();
 
   choose_modality(s.t);
   keep_a_foothold(step, passed);
-  emit(out, contacts, before_us + contact_us + after_us + std::exchange(closing_us_, 0), contact_us);
+  emit(out, contacts_.contacts(), kinematic_us + std::exchange(closing_us_, 0), contact_us);
 }
 
 }  // namespace kilvo

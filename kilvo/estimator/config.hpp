@@ -40,6 +40,8 @@ struct InitialConfig {
 struct EstimatorConfig {
   double max_wait = 0.2;       // s
   double max_imu_gap = 0.025;  // s
+  double smooth_time = 0.5;    // s
+  bool wait_for_images = true;
   bool gravity_align = true;
   int threads = 1;
 
@@ -56,6 +58,10 @@ struct EstimatorConfig {
     return std::tuple{
         Field{"max_wait", &EstimatorConfig::max_wait, "s", "how long, in data time, a measurement waits for others of earlier stamps"},
         Field{"max_imu_gap", &EstimatorConfig::max_imu_gap, "s", "a longer gap between IMU samples is bridged with wide uncertainties"},
+        Field{"wait_for_images", &EstimatorConfig::wait_for_images, "-",
+              "outputs wait for images of earlier stamps; false (the live runner's way): late images are fused when they come"},
+        Field{"smooth_time", &EstimatorConfig::smooth_time, "s",
+              "the smooth odometry takes about two thirds of a correction in over this time"},
         Field{"gravity_align", &EstimatorConfig::gravity_align, "-", "z of the world is up; false: the world is the first IMU frame"},
         Field{"threads", &EstimatorConfig::threads, "-", "threads for sums over many points, 0: all cores; results do not depend on it"}};
   }

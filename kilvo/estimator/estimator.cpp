@@ -5,6 +5,9 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "kilvo/estimator/fault.hpp"
+#include "kilvo/estimator/forerunner.hpp"
+
 namespace kilvo {
 namespace {
 
@@ -22,33 +25,13 @@ bool is_sane(const Estimate& e) {
          e.P.diagonal().segment<3>(at::p).maxCoeff() < absurd_sigma * absurd_sigma;
 }
 
-// What no sensor measures; nullptr: nothing wrong.
-const char* fault_of(const Measurement& m) {
-  constexpr double absurd_gyro = 300, absurd_accel = 5000;  // rad/s, m/s^2 (or g): beyond any IMU's range
-  if (const auto* imu = std::get_if<ImuSample>(&m)) {
-    if (!imu->gyro.allFinite() || !imu->accel.allFinite()) return "not finite";
-    if (imu->gyro.norm() > absurd_gyro || imu->accel.norm() > absurd_accel) return "absurd value";
-  }
-  if (const auto* joints = std::get_if<JointSample>(&m)) {
-    constexpr double absurd_position = 100, absurd_velocity = 100;  // rad or m, rad/s or m/s: no joint turns so fast
-    const auto beyond = [](const std::vector<double>& values, double limit) {
-      return std::ranges::any_of(values, [limit](double v) { return std::isfinite(v) && std::abs(v) > limit; });
-    };
-    if (joints->position.empty()) return "empty";
-    if (beyond(joints->position, absurd_position) || beyond(joints->velocity, absurd_velocity)) return "absurd value";
-  }
-  if (const auto* scan = std::get_if<LidarScan>(&m); scan != nullptr && scan->points.empty()) return "empty";
-  if (const auto* image = std::get_if<CameraImage>(&m); image != nullptr && image->image.empty()) return "empty";
-  return nullptr;
-}
-
 }  // namespace
 
 Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::array<bool, sensor_count> used)
     : robot_(robot),
       config_(config),
       used_(used),
-      timeline_(used, from_seconds(config.max_wait)),
+      timeline_(used, from_seconds(config.max_wait), config.wait_for_images),
       initialiser_(config.initial, config.gravity_align),
       replay_(config),
       trajectory_(trajectory_length),
@@ -102,11 +85,11 @@ std::vector<Output> Estimator::finish() {
     held.t = std::max(held.t, pending_.front().end);
     if (held.t > replay_.newest_imu().t) replay_.add(held);
     process_pending(held.t, out);
-    if (!sweeps_.empty() && estimate_->t < held.t) replay_.advance(*estimate_, held.t, trajectory_);
+    if (!sweeps_.empty() && estimate_->t < held.t) replay_.advance(*estimate_, held.t, &trajectory_);
   }
   while (!sweeps_.empty() || !images_.empty()) {
     // Each has a time of its own, after what has gone out already.
-    if (last_output_) replay_.advance(*estimate_, std::max(estimate_->t, *last_output_ + Duration(1000)), trajectory_);
+    if (last_output_) replay_.advance(*estimate_, std::max(estimate_->t, *last_output_ + Duration(1000)), &trajectory_);
     emit(out);
   }
   for (const Pending& p : pending_) drop(p.sensor(), "no IMU");
@@ -147,17 +130,17 @@ void Estimator::handle(Measurement& m, std::vector<Output>& out) {
   } else if (auto* scan = std::get_if<LidarScan>(&m)) {
     const Time end = completion_of(m);
     const Time begin = begin_of(*scan);
-    pending_.push_back({std::move(*scan), begin, end});
-    bound_pending();
+    wait_for_imu({std::move(*scan), begin, end});
   } else if (auto* image = std::get_if<CameraImage>(&m)) {
     const Time t = image->t;
     if (const char* fault = image_fault(*image)) return drop(Sensor::camera, fault);
-    pending_.push_back({std::move(*image), t, t});
-    bound_pending();
+    wait_for_imu({std::move(*image), t, t});
   }
 }
 
-void Estimator::bound_pending() {
+void Estimator::wait_for_imu(Pending what) {
+  const auto after = std::ranges::upper_bound(pending_, what.end, {}, &Pending::end);
+  pending_.insert(after, std::move(what));
   if (pending_.size() <= max_pending) return;
   drop(pending_.front().sensor(), "no IMU");
   pending_.pop_front();
@@ -260,9 +243,29 @@ Output Estimator::output_now() {
   o.x = estimate_->x;
   o.P = estimate_->P;
   o.P.topLeftCorner<6, 6>() += map_error_.at(estimate_->x.pose());
+  if (replay_.has_imu()) o.omega = replay_.newest_imu().gyro - o.x.bg;
   o.modality = modality_;
   o.cause = cause_;
   return o;
+}
+
+bool Estimator::fork(Forerunner& into) const {
+  if (!estimate_ || !replay_.has_imu()) return false;
+  into.started_ = true;
+  into.imu_lost_ = recovery_.imu_lost;
+  into.accel_scale_ = accel_scale_;
+  into.closed_ = closed_;
+  into.now_ = *estimate_;
+  into.replay_.copy_since(closed_.t, replay_);
+  into.contacts_ = contacts_;
+  into.stances_ = stances_;
+  into.last_legs_ = last_legs_;
+  into.leg_period_ = leg_period_;
+  into.modality_ = modality_;
+  into.cause_ = cause_;
+  into.map_error_ = map_error_.at(estimate_->x.pose());
+  into.with_legs_ = false;
+  return true;
 }
 
 }  // namespace kilvo

@@ -25,6 +25,8 @@
 
 namespace kilvo {
 
+class Forerunner;
+
 class Estimator {
  public:
   /// `used`: which sensors will be pushed, by Sensor; others are ignored and counted. Throws std::invalid_argument when a setting makes
@@ -40,6 +42,10 @@ class Estimator {
   /// The same, appended to `out`: a caller that uses one vector again and again spares the leg path its only allocation.
   void push(Measurement m, std::vector<Output>& out);
 
+  /// For who cannot wait for sweeps and images: sets a forerunner to the present state, from which it goes on by itself. False, and nothing
+  /// is changed, before the start.
+  bool fork(Forerunner& into) const;
+
   /// No more measurements will come: what still waits is processed.
   std::vector<Output> finish();
 
@@ -47,17 +53,26 @@ class Estimator {
   std::optional<std::string> mismatch(const JointSample& s) const { return kinematics_ ? kinematics_->mismatch(s) : std::nullopt; }
 
   const Statistics& statistics() const { return statistics_; }
+  /// Of the messages as they have arrived until now.
+  const Health& health() const { return health_; }
   const VoxelMap& map() const { return map_; }
   bool initialised() const { return estimate_.has_value(); }
   /// What it waits for before the first output; empty afterwards.
   std::string waiting_for() const { return initialised() ? std::string() : initialiser_.waiting_for(); }
 
  private:
+  struct Pending {
+    std::variant<LidarScan, CameraImage> what;
+    Time begin, end;  // of the scan; the image's stamp
+    Sensor sensor() const { return std::holds_alternative<LidarScan>(what) ? Sensor::lidar : Sensor::camera; }
+    Time middle() const { return begin + (end - begin) / 2; }
+  };
+
   // estimator.cpp: the order of things
   void handle(Measurement& m, std::vector<Output>& out);
   void handle_before_start(Measurement& m, std::vector<Output>& out);
   void begin(const Start& start, std::vector<Output>& out);
-  void bound_pending();
+  void wait_for_imu(Pending what);
   void bound_images_before_start();
   void warn_of_unused_sensors();
   void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
@@ -112,12 +127,6 @@ class Estimator {
   Estimate closed_;                   // at the newest IMU sample, all intervals before it with both their ends
   Estimate anchor_;                   // after the last sweep, at the sweep's own time; what came since is replayed on it
   Replay replay_;                     // from the anchor on
-  struct Pending {
-    std::variant<LidarScan, CameraImage> what;
-    Time begin, end;  // of the scan; the image's stamp
-    Sensor sensor() const { return std::holds_alternative<LidarScan>(what) ? Sensor::lidar : Sensor::camera; }
-    Time middle() const { return begin + (end - begin) / 2; }
-  };
   std::deque<Pending> pending_;  // by end
   bool ended_ = false;
   std::deque<Output> sweeps_;    // results of sweeps, each to go out with one of the next leg samples

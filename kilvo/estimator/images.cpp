@@ -61,7 +61,7 @@ void Estimator::process(const CameraImage& image) {
   Stopwatch watch;
   const std::vector<GreyImage> pyramid = pyramid_of(to_grey(image.image), Patch::levels);
   Estimate prior = anchor_;
-  replay_.advance(prior, image.t, trajectory_);
+  replay_.advance(prior, image.t, &trajectory_);
   if (is_lost_among_patches(prior)) return drop(Sensor::camera, "the pose is too uncertain");
   const SE3 expected = T_CI_ * prior.x.pose().inverse();
   const DepthView depth(*camera_, expected, seen_W_);

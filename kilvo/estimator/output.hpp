@@ -31,6 +31,7 @@ struct Output {
   Time t{};
   State x;
   Covariance P = Covariance::Zero();  // of the error relative to the first pose (state.hpp: at)
+  Eigen::Vector3d omega = Eigen::Vector3d::Zero();  // bias-free angular rate of the newest IMU sample, in the IMU frame, rad/s
   Modality modality = Modality::coast;
   const char* cause = "start";       // of the last change of modality
   bool is_sweep = false;             // state after the last update of a sweep

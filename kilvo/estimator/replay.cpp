@@ -128,14 +128,35 @@ std::array<bool, 2> Replay::apply(Estimate& e, const LegStep& step) const {
   return model.passed();
 }
 
-void Replay::advance(Estimate& e, Time until, Trajectory& record) const {
+void Replay::advance(Estimate& e, Time until, Trajectory* record) const {
   auto step = std::upper_bound(steps_.begin(), steps_.end(), e.t, [](Time t, const LegStep& s) { return t < s.t; });
   for (; step != steps_.end() && step->t <= until; ++step) {
-    predict_to(e, step->t, &record);
+    predict_to(e, step->t, record);
     apply(e, *step);
-    record.push(e.t, e.x.pose(), e.x.v);
+    if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
   }
-  predict_to(e, until, &record);
+  predict_to(e, until, record);
+}
+
+Time Replay::newest_imu_by(Time t) const {
+  const auto after = std::upper_bound(imu_.begin(), imu_.end(), t, [](Time value, const ImuSample& s) { return value < s.t; });
+  return after == imu_.begin() ? Time::min() : (after - 1)->t;
+}
+
+void Replay::copy_since(Time t, const Replay& other) {
+  imu_.clear();
+  steps_.clear();
+  // What forget_before would leave.
+  for (std::size_t i = 0; i < other.imu_.size(); ++i) {
+    if (i + 2 >= other.imu_.size() || other.imu_[i + 1].t > t) imu_.push_back(other.imu_[i]);
+  }
+  for (std::size_t i = 0; i < other.steps_.size(); ++i) {
+    if (i + 1 >= other.steps_.size() || other.steps_[i + 1].t > t) steps_.push_back(other.steps_[i]);
+  }
+  gyro_mean_ = other.gyro_mean_;
+  accel_mean_ = other.accel_mean_;
+  gyro_variance_ = other.gyro_variance_;
+  accel_variance_ = other.accel_variance_;
 }
 
 void Replay::forget_before(Time t) {

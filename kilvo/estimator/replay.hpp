@@ -24,10 +24,12 @@ class Replay {
 
   bool has_imu() const { return !imu_.empty(); }
   const ImuSample& newest_imu() const { return imu_.back(); }
+  /// The stamp of the newest IMU sample that is not after t; before all times when there is none.
+  Time newest_imu_by(Time t) const;
 
   /// Predicts e to `until`, applying the leg steps after e.t on the way. Between IMU samples with both of them, after the newest one with
-  /// that held. Every state goes into `record`.
-  void advance(Estimate& e, Time until, Trajectory& record) const;
+  /// that held. Every state goes into `record`, if there is one.
+  void advance(Estimate& e, Time until, Trajectory* record) const;
 
   /// Predicts e to `until` without looking at the legs.
   void predict_to(Estimate& e, Time until, Trajectory* record) const;
@@ -37,6 +39,8 @@ class Replay {
 
   /// What is not needed by estimates of `t` and later.
   void forget_before(Time t);
+  /// Becomes what `other` still knows that estimates of `t` and later need. Allocates only when it has never held so much.
+  void copy_since(Time t, const Replay& other);
   void clear_steps() { steps_.clear(); }
 
  private:

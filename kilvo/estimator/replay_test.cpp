@@ -65,7 +65,7 @@ Estimate start() {
 
 Estimate advanced(const Replay& replay, Estimate e, Time until) {
   Trajectory record(std::chrono::seconds(2));
-  replay.advance(e, until, record);
+  replay.advance(e, until, &record);
   return e;
 }
 
@@ -171,7 +171,7 @@ TEST(Replay, AllStatesOnTheWayAreRecorded) {
   Trajectory record(std::chrono::seconds(2));
   Estimate e = start();
   record.push(e.t, e.x.pose(), e.x.v);
-  replay.advance(e, begin_time + milliseconds(100), record);
+  replay.advance(e, begin_time + milliseconds(100), &record);
   EXPECT_EQ(record.size(), 101u);
   EXPECT_EQ(record.newest(), e.t);
   EXPECT_LT((record.at(e.t)->p - e.x.p).norm(), 1e-15) << "after the step, not before it";
@@ -186,7 +186,7 @@ TEST(Replay, AcrossAGapOfTheImuTheCovarianceSaysThatNobodyLooked) {
     Estimate e = start();
     e.P *= 1e-6;
     Trajectory record(std::chrono::seconds(2));
-    replay.advance(e, begin_time + milliseconds(200) + gap, record);
+    replay.advance(e, begin_time + milliseconds(200) + gap, &record);
     return e.P.block<3, 3>(at::v, at::v).trace();
   };
   EXPECT_GT(after_gap(milliseconds(40)), 20 * after_gap(milliseconds(20)));

@@ -79,9 +79,9 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   // the sweep cancels to first order. What came since is replayed.
   const Time centre = std::max(anchor_.t, end - (end - begin_of(scan)) / 2);
   Estimate prior = anchor_;
-  replay_.advance(prior, centre, trajectory_);
+  replay_.advance(prior, centre, &trajectory_);
   Estimate ahead = prior;
-  replay_.advance(ahead, end, trajectory_);
+  replay_.advance(ahead, end, &trajectory_);
   const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
   const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size, config_.lidar.reach());
   const Eigen::Vector3d p_IL = robot_.lidar.T_imu_lidar.p;
@@ -94,7 +94,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   const bool first = map_.empty();
   if (!register_sweep(prior, model, clusters, within_scan)) {
     refuse_sweep(end);
-    return replay_.advance(*estimate_, end, trajectory_);
+    return replay_.advance(*estimate_, end, &trajectory_);
   }
   const bool good = keep_finite();
   StageTimes stages;
@@ -110,7 +110,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   }
   stages.map_us = watch.lap_us();
 
-  replay_.advance(*estimate_, end, trajectory_);
+  replay_.advance(*estimate_, end, &trajectory_);
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::lidar)].used;
   statistics_.diverged = statistics_.diverged || estimate_->x.v.norm() > absurd_speed;
   if (first || says_enough(model.report())) last_sweep_ = end;

@@ -50,25 +50,57 @@ std::optional<std::string> Timeline::admit(Measurement m, Time key) {
   const Time stamp = stamp_of(m);
   const auto s = static_cast<std::size_t>(sensor_of(m));
   if (stamp_[s] == stamp) return "duplicate";
-  if (released_ && key < *released_) return "late";
+  const Sensor sensor = sensor_of(m);
+  // What is fused at its own time may come after others.
+  const Duration patience = sensor == Sensor::lidar || sensor == Sensor::camera ? max_wait_ : Duration(0);
+  if (released_ && key < *released_ - patience) return "late";
   if (!newest_[s] || key > *newest_[s]) {
+    note_spacing(s, key);
     newest_[s] = key;
     stamp_[s] = stamp;
   }
   newest_of_all_ = std::max(newest_of_all_.value_or(key), key);
-  const auto place = std::tuple(key, sensor_of(m), sequence_++);
+  const auto place = std::tuple(key, sensor, sequence_++);
+  const auto* scan = std::get_if<LidarScan>(&m);
+  const Time middle = scan == nullptr ? stamp : key - (key - begin_of(*scan)) / 2;
   if (spare_.empty()) {
-    waiting_.emplace(place, std::move(m));
+    waiting_.emplace(place, Waiting{std::move(m), middle});
   } else {
     spare_.back().key() = place;
-    spare_.back().mapped() = std::move(m);
+    spare_.back().mapped() = {std::move(m), middle};
     waiting_.insert(std::move(spare_.back()));
     spare_.pop_back();
   }
   return std::nullopt;
 }
 
-bool Timeline::may_go(Time key) const {
+void Timeline::note_spacing(std::size_t s, Time key) {
+  if (!newest_[s]) return;
+  const Duration gap = key - *newest_[s];
+  // Grows slowly, whatever was missed: a message more that is waited for costs little, one that is not may come too late.
+  spacing_[s] = spacing_[s] == Duration(0) || gap < spacing_[s] ? gap : spacing_[s] + (std::min(gap, 2 * spacing_[s]) - spacing_[s]) / 8;
+}
+
+// Something may come of this sensor that must go before.
+bool Timeline::is_awaited(std::size_t s, Time key, const Waiting& first) const {
+  const bool is_scan = std::holds_alternative<LidarScan>(first.m);
+  switch (static_cast<Sensor>(s)) {
+    case Sensor::imu:
+    case Sensor::legs:
+      return !newest_[s] || *newest_[s] < key;
+    case Sensor::camera:
+      if (wait_for_images_) break;
+      if (!is_scan) return false;
+      key = first.middle;
+      break;
+    case Sensor::lidar:
+      break;
+  }
+  // A message that comes so much sooner than the one before is fused late, no more.
+  return !newest_[s] || *newest_[s] + 7 * spacing_[s] / 10 < key;
+}
+
+bool Timeline::may_go(Time key, const Waiting& first) const {
   // The IMU, which everything needs, is the clock: one sensor that is ahead of it must not make all others late. If it is silent, so much
   // may gather and no more.
   constexpr std::size_t most = 5000;
@@ -77,16 +109,17 @@ bool Timeline::may_go(Time key) const {
       expected_[static_cast<std::size_t>(Sensor::imu)] ? imu && *imu - key >= max_wait_ : *newest_of_all_ - key >= max_wait_;
   if (ended_ || waited || waiting_.size() > most) return true;
   for (std::size_t s = 0; s < sensor_count; ++s) {
-    if (expected_[s] && (!newest_[s] || *newest_[s] < key)) return false;
+    if (expected_[s] && is_awaited(s, key, first)) return false;
   }
   return true;
 }
 
 std::optional<Measurement> Timeline::pop() {
-  if (waiting_.empty() || !may_go(std::get<Time>(waiting_.begin()->first))) return std::nullopt;
+  if (waiting_.empty() || !may_go(std::get<Time>(waiting_.begin()->first), waiting_.begin()->second)) return std::nullopt;
   auto first = waiting_.extract(waiting_.begin());
-  released_ = std::get<Time>(first.key());
-  std::optional<Measurement> out = std::move(first.mapped());
+  const Time key = std::get<Time>(first.key());
+  released_ = std::max(released_.value_or(key), key);
+  std::optional<Measurement> out = std::move(first.mapped().m);
   constexpr std::size_t most_spare = 64;
   if (spare_.size() < most_spare) spare_.push_back(std::move(first));
   return out;

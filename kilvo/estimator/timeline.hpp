@@ -1,5 +1,8 @@
-// Puts measurements into the order of their stamps. A measurement is released when every expected sensor has been heard beyond it, or
-// when it has waited max_wait of the IMU's time.
+// Puts measurements into the order of their stamps. A measurement is released when nothing of an earlier stamp can be expected any more
+// that must go before it, or when it has waited max_wait of the IMU's time.
+//
+// Scans are waited for from when the next one may be complete. So are images; but since a late one is fused at its own time all the same,
+// one need not: then nothing waits for an image but a scan, and that only for images of before its middle.
 #pragma once
 
 #include <array>
@@ -23,9 +26,11 @@ Time begin_of(const LidarScan& scan);
 
 class Timeline {
  public:
-  Timeline(std::array<bool, sensor_count> expected, Duration max_wait) : expected_(expected), max_wait_(max_wait) {}
+  Timeline(std::array<bool, sensor_count> expected, Duration max_wait, bool wait_for_images = true)
+      : expected_(expected), max_wait_(max_wait), wait_for_images_(wait_for_images) {}
 
-  /// Takes the measurement, or says why not ("late", "duplicate"). One that is over a second ahead of all others is kept apart: if the
+  /// Takes the measurement, or says why not ("late", "duplicate"). Scans and images may come up to max_wait after others of their time have
+  /// been released: they go next. One that is over a second ahead of all others is kept apart: if the
   /// next ones are there as well, time has really passed; if not, its clock was wrong (take_jumped).
   std::optional<std::string> push(Measurement m);
 
@@ -39,22 +44,30 @@ class Timeline {
   void end();
 
  private:
-  bool may_go(Time key) const;
+  struct Waiting {
+    Measurement m;
+    Time middle;  // of a scan; of all others the stamp
+  };
+  bool may_go(Time key, const Waiting& first) const;
+  bool is_awaited(std::size_t s, Time key, const Waiting& first) const;
+  void note_spacing(std::size_t s, Time key);
   void give_up_suspects();
   std::optional<std::string> admit(Measurement m, Time key);
 
   std::array<bool, sensor_count> expected_;
   std::array<std::optional<Time>, sensor_count> newest_;
   std::array<std::optional<Time>, sensor_count> stamp_;  // of the newest
+  std::array<Duration, sensor_count> spacing_{};         // of the keys, lately, at the least
   std::optional<Time> released_, newest_of_all_;
   // By completion; of the same time the IMU first; then by arrival.
-  using Queue = std::map<std::tuple<Time, Sensor, std::uint64_t>, Measurement>;
+  using Queue = std::map<std::tuple<Time, Sensor, std::uint64_t>, Waiting>;
   Queue waiting_;
   std::vector<Queue::node_type> spare_;  // nodes of what has gone, to be used again: nothing is allocated at the rate of the legs
   std::vector<Measurement> suspects_;    // ahead of all others
   std::vector<Sensor> jumped_;
   std::uint64_t sequence_ = 0;
   Duration max_wait_;
+  bool wait_for_images_;
   bool ended_ = false;
 };
 

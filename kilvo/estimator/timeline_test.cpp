@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace kilvo {
 namespace {
 
@@ -23,7 +25,8 @@ LidarScan scan_from(double s, double length) {
 
 std::vector<double> all_from(Timeline& timeline) {
   std::vector<double> out;
-  while (auto m = timeline.pop()) out.push_back(to_seconds(completion_of(*m).time_since_epoch()));
+  // To a microsecond, so that decimals compare.
+  while (auto m = timeline.pop()) out.push_back(std::round(1e6 * to_seconds(completion_of(*m).time_since_epoch())) / 1e6);
   return out;
 }
 
@@ -43,6 +46,45 @@ TEST(Timeline, ReleasesInOrderOfCompletionOnceBothSensorsAreBeyond) {
   EXPECT_EQ(all_from(timeline), (std::vector<double>{1.0, 1.09})) << "nothing is known of the LiDAR beyond 1.09";
   EXPECT_FALSE(timeline.push(scan_from(1.09, 0.1)));
   EXPECT_EQ(all_from(timeline), (std::vector<double>{1.095}));
+}
+
+TEST(Timeline, NothingWaitsForAScanThatCannotBeCompleteYet) {
+  Timeline timeline(imu_and_lidar, from_seconds(10));
+  for (const double begin : {0.8, 0.9}) EXPECT_FALSE(timeline.push(scan_from(begin, 0.1)));
+  for (const double s : {0.95, 1.0, 1.06, 1.08}) EXPECT_FALSE(timeline.push(imu_at(s)));
+  EXPECT_EQ(all_from(timeline), (std::vector<double>{0.9, 0.95, 1.0, 1.0, 1.06})) << "the next scan may be complete from 1.07 on";
+}
+
+TEST(Timeline, OnlyAScanWaitsForImagesAndOnlyForThoseBeforeItsMiddle) {
+  CameraImage image;
+  const auto image_at = [&image](double s) {
+    image.t = time_from_ns(0) + from_seconds(s);
+    return image;
+  };
+  Timeline timeline({true, false, true, true}, from_seconds(10), false);
+  EXPECT_FALSE(timeline.push(scan_from(0.9, 0.1)));
+  for (const double s : {0.84, 0.94}) EXPECT_FALSE(timeline.push(image_at(s)));
+  EXPECT_FALSE(timeline.push(imu_at(0.9)));
+  EXPECT_FALSE(timeline.push(imu_at(1.01)));
+  EXPECT_EQ(all_from(timeline), (std::vector<double>{0.84, 0.9, 0.94, 1.0})) << "no image of before 0.95 can be missing";
+  EXPECT_FALSE(timeline.push(scan_from(1.0, 0.1)));
+  EXPECT_FALSE(timeline.push(imu_at(1.11)));
+  EXPECT_EQ(all_from(timeline), (std::vector<double>{1.01})) << "the image of 1.04 belongs before the middle of the scan";
+  EXPECT_FALSE(timeline.push(image_at(1.04)));
+  EXPECT_EQ(all_from(timeline), (std::vector<double>{1.04, 1.1, 1.11}));
+}
+
+TEST(Timeline, ALateScanOrImageGoesNext) {
+  CameraImage image;
+  image.t = time_from_ns(0) + from_seconds(0.9);
+  Timeline timeline({true, false, false, true}, from_seconds(0.2));
+  for (const double s : {0.8, 1.0}) EXPECT_FALSE(timeline.push(imu_at(s)));
+  EXPECT_EQ(all_from(timeline).size(), 2u);
+  EXPECT_FALSE(timeline.push(image));
+  EXPECT_EQ(all_from(timeline), (std::vector<double>{0.9}));
+  EXPECT_EQ(timeline.push(imu_at(0.99)), "late");
+  image.t -= from_seconds(0.2);
+  EXPECT_EQ(timeline.push(image), "late");
 }
 
 TEST(Timeline, WaitsForASilentSensorNoLongerThanMaxWait) {

@@ -99,6 +99,7 @@ std::vector<Setting> list_settings(Settings& s) {
   list.fields("estimator", s.estimator);
   list.fields("estimator.initial", s.estimator.initial);
   list.fields("estimator.update", s.estimator.update);
+  list.fields("live", s.live);
   forget_defaults_of_intrinsics(out);
   return out;
 }

@@ -12,6 +12,7 @@
 #include "kilvo/sensors/measurement.hpp"
 #include "kilvo/sensors/robot.hpp"
 #include "lab/mapping/map_builder.hpp"
+#include "lab/settings/live_config.hpp"
 
 namespace kilvo::lab {
 
@@ -26,6 +27,7 @@ struct Settings {
   std::array<std::string, sensor_count> topics;  // by Sensor; empty: this robot does not have it
   EstimatorConfig estimator;
   MappingConfig mapping;
+  LiveConfig live;
 
   std::map<std::string, std::string> given;  // key -> where it was set ("g1.yaml:12"); all others have their defaults
 

@@ -131,23 +131,29 @@ void FailingSource::take(Measurement measurement, Time arrived) {
     if (delay > 0) {
       held_.emplace(arrived + from_seconds(delay), measurement);
     } else {
-      ready_.push_back(measurement);
+      ready_.emplace_back(arrived, measurement);
     }
   }
 }
 
 std::optional<Measurement> FailingSource::next() {
-  if (failures_.empty()) return source_.next();
+  const auto arrival_of = [this](const Measurement& m) { return arrival_ ? arrival_() : stamp_of(m); };
+  if (failures_.empty()) {
+    auto measurement = source_.next();
+    if (measurement) arrived_ = arrival_of(*measurement);
+    return measurement;
+  }
   while (ready_.empty()) {
     auto measurement = source_.next();
-    const Time now = !measurement ? Time::max() : arrival_ ? arrival_() : stamp_of(*measurement);
+    const Time now = measurement ? arrival_of(*measurement) : Time::max();
     const auto due = held_.upper_bound(now);
-    for (auto it = held_.begin(); it != due; ++it) ready_.push_back(std::move(it->second));
+    for (auto it = held_.begin(); it != due; ++it) ready_.emplace_back(it->first, std::move(it->second));
     held_.erase(held_.begin(), due);
     if (!measurement && ready_.empty()) return std::nullopt;
     if (measurement) take(*std::move(measurement), now);
   }
-  Measurement out = std::move(ready_.front());
+  arrived_ = ready_.front().first;
+  Measurement out = std::move(ready_.front().second);
   ready_.pop_front();
   return out;
 }

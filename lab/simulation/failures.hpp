@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "kilvo/sensors/measurement_source.hpp"
@@ -44,6 +45,9 @@ class FailingSource final : public MeasurementSource {
   /// In the order of arrival.
   std::optional<Measurement> next() override;
 
+  /// When the measurement that next() gave last arrived.
+  Time arrived() const { return arrived_; }
+
   /// Messages lost by `drop`.
   std::uint64_t dropped(Sensor sensor) const { return dropped_[static_cast<std::size_t>(sensor)]; }
 
@@ -57,8 +61,9 @@ class FailingSource final : public MeasurementSource {
   Time begin_;
   std::function<Time()> arrival_;
   Random random_;
-  std::deque<Measurement> ready_;
+  std::deque<std::pair<Time, Measurement>> ready_;               // by when they arrived
   std::multimap<Time, Measurement> held_;                        // by when they are due
+  Time arrived_{};
   std::array<std::optional<Measurement>, sensor_count> before_;  // the last unspoilt one, for `freeze`
   std::array<std::uint64_t, sensor_count> dropped_{};
 };

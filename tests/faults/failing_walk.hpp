@@ -100,9 +100,31 @@ class FailingWalk {
     settings_ = lab::parse_settings(lab::simulated_config(config, "sim.urdf"), "simulated", std::string(KILVO_SOURCE_DIR) + "/config/robots");
   }
 
-  Outcome with(std::vector<lab::Failure> failures, std::optional<std::array<bool, sensor_count>> used = {}) const {
+  const lab::Settings& settings() const { return settings_; }
+  const std::array<bool, sensor_count>& used() const { return used_; }
+  Time time(double seconds) const { return simulator_->start() + from_seconds(seconds); }
+
+  /// Every measurement that arrives, in order.
+  template <class Take>
+  void play(std::vector<lab::Failure> failures, Take&& take) const {
     Recorded recorded(measurements_);
     lab::FailingSource source(recorded, std::move(failures), simulator_->start(), [&recorded] { return recorded.arrived(); });
+    while (auto m = source.next()) take(*std::move(m));
+  }
+
+  /// Of the positions, in the truth's world, m.
+  double worst_error(const std::vector<Output>& outputs) const {
+    double out = 0;
+    std::optional<SE3> T_WR;
+    for (const Output& o : outputs) {
+      const SE3 truth = simulator_->walk().imu(simulator_->seconds_of(o.t));
+      if (!T_WR) T_WR = o.x.pose() * truth.inverse();
+      out = std::max(out, (o.x.p - (*T_WR * truth).p).norm());
+    }
+    return out;
+  }
+
+  Outcome with(std::vector<lab::Failure> failures, std::optional<std::array<bool, sensor_count>> used = {}) const {
     Estimator estimator(settings_.robot, settings_.estimator, used.value_or(used_));
     Outcome out;
     std::optional<SE3> T_WR;
@@ -123,7 +145,7 @@ class FailingWalk {
         out.moments.push_back(std::move(m));
       }
     };
-    while (auto m = source.next()) take(estimator.push(*std::move(m)));
+    play(std::move(failures), [&](Measurement m) { take(estimator.push(std::move(m))); });
     take(estimator.finish());
     out.statistics = estimator.statistics();
     return out;

@@ -1,0 +1,26 @@
+#include "kilvo/estimator/footfall.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kilvo/estimator/stopwatch.hpp"
+
+namespace kilvo {
+
+Footfall take_step(const Feet& feet, Estimate& e, ContactEstimator& contacts, StanceTracker& stances, Replay& replay, const VoxelMap* map,
+                   StanceTracker::Ground ground) {
+  Footfall out;
+  const State& x = e.x;
+  const Eigen::Vector3d omega = replay.newest_imu().gyro - x.bg;
+  const double sigma_v = std::sqrt(std::max(0.0, e.P.block<3, 3>(at::v, at::v).trace() / 3));
+  Stopwatch watch;
+  contacts.update(feet, x, omega, replay.newest_imu().accel - x.ba, sigma_v, map);
+  out.contact_us = watch.lap_us();
+  out.step = stances.step(feet, contacts, x, omega, sigma_v, map, ground);
+  replay.add(out.step);
+  out.passed = replay.apply(e, out.step);
+  stances.judge(out.step, out.passed);
+  return out;
+}
+
+}  // namespace kilvo

@@ -1,0 +1,82 @@
+#include "kilvo/estimator/forerunner.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kilvo/estimator/fault.hpp"
+#include "kilvo/estimator/footfall.hpp"
+#include "kilvo/estimator/recovery.hpp"
+#include "kilvo/estimator/silence.hpp"
+#include "kilvo/estimator/stopwatch.hpp"
+
+namespace kilvo {
+
+Forerunner::Forerunner(const Robot& robot, const EstimatorConfig& config)
+    : leg_rate_(robot.legs.rate), imu_rate_(robot.imu.rate), replay_(config), contacts_(config.legs), stances_(config.legs) {}
+
+// Both ends of the IMU's intervals up to the newest sample that is not after `until` are known now.
+void Forerunner::close(Time until) {
+  const Time newest = replay_.newest_imu_by(until);
+  if (newest <= closed_.t) return;
+  replay_.advance(closed_, newest, nullptr);
+  now_ = closed_;
+  replay_.forget_before(closed_.t);
+  // A sample of the IMU that came after leg samples of later stamps.
+  if (last_legs_ && *last_legs_ > now_.t) replay_.advance(now_, *last_legs_, nullptr);
+}
+
+bool Forerunner::push(const ImuSample& raw) {
+  if (!started_ || imu_lost_ || fault_of(raw) != nullptr) return false;
+  const Time newest = replay_.newest_imu().t;
+  // Whether its clock has jumped or the IMU was silent is for the estimator to find out.
+  if (raw.t <= newest || to_seconds(raw.t - newest) > blind_gap) return false;
+  ImuSample s = raw;
+  s.accel *= accel_scale_;
+  replay_.add(s);
+  if (last_legs_ && !are_legs_overdue(s.t - *last_legs_, leg_rate_, leg_period_)) return false;
+  close(s.t);
+  with_legs_ = false;
+  return true;
+}
+
+bool Forerunner::push(const Feet& feet) {
+  if (!started_ || imu_lost_ || !last_legs_ || feet.t <= *last_legs_ || feet.t < closed_.t) return false;
+  if (to_seconds(feet.t - replay_.newest_imu().t) > longest_held_imu(imu_rate_)) return false;
+  if (feet.t - *last_legs_ > silence_of_legs(leg_rate_)) {
+    last_legs_.reset();  // they come again: how, the estimator decides
+    return false;
+  }
+  Stopwatch watch;
+  close(feet.t);
+  if (feet.t < now_.t) return false;
+  leg_period_ = std::min(0.1, to_seconds(feet.t - *last_legs_));
+  last_legs_ = feet.t;
+  replay_.predict_to(now_, feet.t, nullptr);
+  // Without the map: it is the estimator's, and grows. What the ground tells is told by the next fork.
+  contact_us_ = take_step(feet, now_, contacts_, stances_, replay_, nullptr, StanceTracker::Ground::learn).contact_us;
+  if (feet.t == closed_.t) closed_ = now_;
+  with_legs_ = true;
+  kinematic_us_ = watch.lap_us();
+  return true;
+}
+
+Output Forerunner::output() const {
+  Output o;
+  Estimate e = now_;
+  if (imu_lost_) widen(e, e.t, e.t + from_seconds(blind_gap), blind_gap);
+  o.t = e.t;
+  o.x = e.x;
+  o.P = e.P;
+  o.P.topLeftCorner<6, 6>() += map_error_;
+  o.omega = replay_.newest_imu().gyro - now_.x.bg;
+  o.modality = modality_;
+  o.cause = cause_;
+  if (with_legs_) {
+    o.contacts = contacts_.contacts();
+    o.kinematic_us = kinematic_us_;
+    o.contact_us = contact_us_;
+  }
+  return o;
+}
+
+}  // namespace kilvo

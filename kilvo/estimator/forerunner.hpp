@@ -1,0 +1,60 @@
+// The asynchronous phase by itself, ahead of the estimator: what the IMU and the legs say at once, on top of a state that a sweep or an
+// image still waits to correct. A value that the estimator fills (Estimator::fork) and that then goes on alone, until the next one.
+// docs/decisions/2026-11-21-the-fast-thread-runs-ahead.md says why.
+#pragma once
+
+#include <optional>
+
+#include "kilvo/estimator/output.hpp"
+#include "kilvo/estimator/replay.hpp"
+#include "kilvo/legs/contact_estimator.hpp"
+#include "kilvo/legs/leg_kinematics.hpp"
+#include "kilvo/legs/leg_measurements.hpp"
+#include "kilvo/sensors/robot.hpp"
+
+namespace kilvo {
+
+class Forerunner {
+ public:
+  Forerunner(const Robot& robot, const EstimatorConfig& config);
+
+  /// Each takes a measurement in the order of its arrival and says whether there is a new output. One that it knows already, that is late,
+  /// or that is too far ahead to be believed is ignored: the estimator sees it as well. Neither allocates, once warm.
+  bool push(const ImuSample& s);
+  bool push(const Feet& feet);
+
+  /// Of the newest state; its time never goes back within one value, but may against another's.
+  Output output() const;
+
+  bool started() const { return started_; }
+  /// The IMU is silent: no pose until it is back.
+  bool imu_lost() const { return imu_lost_; }
+  /// Measurements of earlier stamps are of no use to it.
+  Time known() const { return closed_.t; }
+
+ private:
+  friend class Estimator;  // fills it
+  void close(Time until);
+
+  // Of the robot, never changed:
+  double leg_rate_, imu_rate_;
+
+  // From the estimator:
+  bool started_ = false, imu_lost_ = false;
+  double accel_scale_ = 1;
+  Estimate closed_;                 // at an IMU sample
+  Estimate now_;                    // at the newest measurement
+  Replay replay_;                   // from closed_ on
+  ContactEstimator contacts_;
+  StanceTracker stances_;
+  std::optional<Time> last_legs_;   // while the legs are used
+  double leg_period_ = 0;           // s
+  Modality modality_ = Modality::coast;
+  const char* cause_ = "start";
+  PoseCovariance map_error_ = PoseCovariance::Zero();
+
+  bool with_legs_ = false;          // the newest output is of a leg sample
+  double kinematic_us_ = 0, contact_us_ = 0;  // what that took
+};
+
+}  // namespace kilvo

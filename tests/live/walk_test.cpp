@@ -1,0 +1,132 @@
+// A walk through the live runner: every message as it arrives, all threads at work. No test here depends on how fast the machine is: after
+// each message it is waited until the threads have nothing to do.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <thread>
+
+#include "apps/live/live_runner.hpp"
+#include "tests/faults/failing_walk.hpp"
+
+namespace kilvo {
+namespace {
+
+struct Lived {
+  std::vector<Output> states, sweeps;
+  live::LiveStatistics statistics;
+};
+
+Lived live_through(const test::FailingWalk& walk, std::vector<lab::Failure> failures) {
+  Lived out;
+  EstimatorConfig config = walk.settings().estimator;
+  config.wait_for_images = false;
+  Estimator estimator(walk.settings().robot, config, walk.used());
+  lab::LiveConfig live;
+  live.max_latency = 10;  // a slow machine gives nothing up
+  live::LiveRunner runner(estimator, walk.settings().robot, config, walk.used(), live,
+                          {[&out](Output o) { out.states.push_back(std::move(o)); }, [&out](Output o) { out.sweeps.push_back(std::move(o)); }});
+  walk.play(std::move(failures), [&runner](Measurement m) {
+    runner.push(std::move(m));
+    while (!runner.is_idle()) std::this_thread::yield();
+  });
+  runner.stop();
+  out.statistics = runner.statistics();
+  return out;
+}
+
+std::vector<Output> offline(const test::FailingWalk& walk, std::vector<lab::Failure> failures) {
+  std::vector<Output> out;
+  EstimatorConfig config = walk.settings().estimator;
+  config.wait_for_images = false;
+  Estimator estimator(walk.settings().robot, config, walk.used());
+  walk.play(std::move(failures), [&](Measurement m) { estimator.push(std::move(m), out); });
+  std::ranges::move(estimator.finish(), std::back_inserter(out));
+  return out;
+}
+
+const test::FailingWalk& walk() {
+  static const test::FailingWalk walk("room", 3, 10, true);
+  return walk;
+}
+
+TEST(LiveWalk, IsTheOfflineOneOnceTheCorrectionsAreIn) {
+  const std::vector<Output> expected = offline(walk(), {});
+  const Lived lived = live_through(walk(), {});
+  std::map<Time, const Output*> at;
+  std::vector<const Output*> sweeps;
+  for (const Output& o : expected) {
+    at[o.t] = &o;
+    if (o.is_sweep || o.is_image) sweeps.push_back(&o);
+  }
+  ASSERT_EQ(lived.sweeps.size(), sweeps.size());
+  for (std::size_t i = 0; i < sweeps.size(); ++i) {
+    ASSERT_EQ(lived.sweeps[i].t, sweeps[i]->t);
+    ASSERT_EQ(lived.sweeps[i].x.p, sweeps[i]->x.p) << "to the last bit";
+  }
+  // A scan arrives some milliseconds after its end; until then the live runner cannot know it.
+  constexpr Duration arrived = std::chrono::milliseconds(40);
+  std::size_t compared = 0, sweep = 0;
+  for (const Output& o : lived.states) {
+    while (sweep + 1 < sweeps.size() && sweeps[sweep + 1]->t <= o.t) ++sweep;
+    const auto same = at.find(o.t);
+    if (same == at.end() || o.t < sweeps[sweep]->t + arrived) continue;
+    ++compared;
+    const State& x = same->second->x;
+    ASSERT_LT((o.x.p - x.p).norm(), 1e-3) << "at " << to_seconds(o.t - expected.front().t);
+    ASSERT_LT((o.x.R.inverse() * x.R).Log().norm(), 0.05 * M_PI / 180) << "at " << to_seconds(o.t - expected.front().t);
+  }
+  EXPECT_GT(compared, 1000u);
+  EXPECT_EQ(lived.statistics.dropped, (std::array<std::uint64_t, sensor_count>{}));
+  EXPECT_EQ(lived.statistics.dropped_outputs, 0u);
+  EXPECT_GT(lived.statistics.correction.count(), 50u);
+}
+
+TEST(LiveWalk, LateSensorsCostNoMessageAndLittleAccuracy) {
+  for (const auto& [sensor, seconds] : {std::pair(Sensor::camera, 0.1), std::pair(Sensor::lidar, 0.05), std::pair(Sensor::legs, 0.02)}) {
+    const Lived lived = live_through(walk(), {{.kind = lab::FailureKind::delay, .sensor = sensor, .amount = seconds}});
+    EXPECT_LT(walk().worst_error(lived.states), 0.02) << name_of(sensor);
+    EXPECT_GT(lived.states.size(), 2500u) << name_of(sensor);
+    const auto images = std::ranges::count_if(lived.sweeps, &Output::is_image), sweeps = std::ranges::count_if(lived.sweeps, &Output::is_sweep);
+    EXPECT_GE(images, 90) << name_of(sensor);
+    EXPECT_GE(sweeps, 90) << name_of(sensor);
+  }
+}
+
+TEST(LiveWalk, OutputsAreFiniteAndOrderedWhateverIsLost) {
+  using lab::FailureKind;
+  const std::vector<std::vector<lab::Failure>> schedules = {
+      {{FailureKind::drop, Sensor::legs, 5, 6.5, 0}, {FailureKind::not_a_number, Sensor::imu, 7, 7.05, 0}},
+      {{FailureKind::drop, Sensor::imu, 5, 5.5, 0}, {FailureKind::time_jump, Sensor::imu, 7, 7.02, 3}},
+      {{FailureKind::drop, Sensor::lidar, 5, 7, 0}, {FailureKind::not_a_number, Sensor::legs, 6, 6.3, 0}},
+      {{FailureKind::freeze, Sensor::imu, 6, 6.5, 0}, {FailureKind::duplicate, Sensor::legs, 4, 8, 0}},
+  };
+  for (std::size_t i = 0; i < schedules.size(); ++i) {
+    const Lived lived = live_through(walk(), schedules[i]);
+    ASSERT_GT(lived.states.size(), 1500u) << i;
+    for (std::size_t k = 0; k < lived.states.size(); ++k) {
+      const Output& o = lived.states[k];
+      ASSERT_TRUE(is_finite({o.t, o.x, o.P})) << i;
+      ASSERT_TRUE(o.omega.allFinite()) << i;
+      if (k > 0) {
+        ASSERT_GT(o.t, lived.states[k - 1].t) << i;
+      }
+    }
+    EXPECT_GT(lived.states.back().t, walk().time(9.9)) << i << ": it goes on";
+  }
+}
+
+TEST(LiveWalk, WithoutAnImuThereIsNoPoseAfterOneThatSaysSo) {
+  const Lived lived = live_through(walk(), {{lab::FailureKind::drop, Sensor::imu, 5, 6, 0}});
+  std::vector<const Output*> during;
+  for (const Output& o : lived.states) {
+    if (o.t > walk().time(5.15) && o.t < walk().time(5.95)) during.push_back(&o);
+  }
+  EXPECT_TRUE(during.empty()) << during.size();
+  const auto lost = std::ranges::find(lived.states, std::string_view("imu lost"), [](const Output& o) { return std::string_view(o.cause); });
+  ASSERT_NE(lost, lived.states.end());
+  EXPECT_EQ(lost->modality, Modality::coast);
+}
+
+}  // namespace
+}  // namespace kilvo
