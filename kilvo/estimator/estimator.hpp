@@ -103,6 +103,7 @@ class Estimator {
   void process_pending(Time until, std::vector<Output>& out);
   bool waits_for_scan(Time image, Time until) const;
   void process(const LidarScan& scan, Time end, std::vector<Output>& out);
+  bool has_no_shape(const Estimate& prior) const;
   void learn(const LidarModel& model, const std::vector<PointCluster>& clusters);  // the map grows
   void settle(const Estimate& e);  // nothing before it will be replayed
 
@@ -146,6 +147,7 @@ class Estimator {
   bool mount_is_doubted_ = false, size_is_doubted_ = false;
   int images_in_vain_ = 0;
   Time images_from_{};  // earlier ones are not used
+  Time sweeps_from_{};  // earlier ones are used when the velocity is known
   std::vector<PointXYZI> seen_W_;      // points of the last sweep
   std::optional<Eigen::Vector3d> last_seen_from_;  // where the last image was taken, m
 

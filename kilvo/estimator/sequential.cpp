@@ -70,6 +70,11 @@ bool Estimator::waits_for_scan(Time image, Time until) const {
   return expected && !has_passed && until < image + 6 * period / 10 && image - last_middle_ < 3 * period;
 }
 
+bool Estimator::has_no_shape(const Estimate& prior) const {
+  constexpr double known_velocity = 0.15;  // m/s: within half a sweep, less than the smallest voxel's plane can tell
+  return prior.P.diagonal().segment<3>(at::v).maxCoeff() > known_velocity * known_velocity;
+}
+
 void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& out) {
   if (end < anchor_.t) return drop(Sensor::lidar, "before the state");
   if (replay_.is_blind(begin_of(scan), end)) return drop(Sensor::lidar, "no IMU");
@@ -82,6 +87,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   replay_.advance(prior, centre, &trajectory_);
   Estimate ahead = replay_.nearest(end, prior);
   replay_.advance(ahead, end, &trajectory_);
+  if (end < sweeps_from_ && has_no_shape(prior)) return drop(Sensor::lidar, "before the motion is known");
   const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
   const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size, config_.lidar.reach());
   const Eigen::Vector3d p_IL = robot_.lidar.T_imu_lidar.p;
