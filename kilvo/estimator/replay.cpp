@@ -23,8 +23,8 @@ void Replay::add(const ImuSample& s) {
 
 // Beyond the end of its range an IMU may have seen anything of the same size.
 void Replay::say_clipped(ImuInterval& interval) const {
-  constexpr double gyro = 3, accel = 20;     // rad/s, m/s^2: what may be missing
-  constexpr double correlation = 0.01;       // s: it stays missing for so long
+  constexpr double gyro = 3, accel = 20;  // rad/s, m/s^2: what may be missing
+  constexpr double correlation = 0.01;    // s: it stays missing for so long
   interval.gyro_scale = gyro * gyro * correlation / (config_.noise.gyro * config_.noise.gyro);
   interval.accel_scale = accel * accel * correlation / (config_.noise.accel * config_.noise.accel);
 }
@@ -52,7 +52,7 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   interval.gyro_scale = gyro2 * gap / (config_.noise.gyro * config_.noise.gyro);
   interval.accel_scale = accel2 * gap / (config_.noise.accel * config_.noise.accel);
   if (gap > blind_gap) interval.accel_scale = 1;  // more is added after the prediction (widen)
-  constexpr double told_by_its_ends = 0.25;  // s
+  constexpr double told_by_its_ends = 0.25;       // s
   if (gap > told_by_its_ends) {
     // The two samples say nothing of the time between.
     interval.gyro_scale = 1;
@@ -76,7 +76,11 @@ FootOrientations Replay::standing_at(Time t) const {
 void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   if (imu_.empty()) return;
   const FootOrientations feet = standing_at(e.t);
-  const auto step = [&](const ImuInterval& interval) {
+  const auto step = [&](ImuInterval interval) {
+    if (interval.begin < told_.until) {
+      interval.gyro_scale *= 1 - told_.rotation;
+      interval.velocity_scale *= 1 - told_.position;
+    }
     e = predict(e, interval, feet, config_.noise);
     if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
   };

@@ -35,6 +35,10 @@ class Replay {
   /// Applies one leg step to e, which must be of its time. Returns which feet of it were used and not refused.
   std::array<bool, 2> apply(Estimate& e, const LegStep& step) const;
 
+  /// A sweep until `end` has been used with points that the IMU's motion took to its middle: what they told of the pose holds these shares
+  /// of what the IMU will get wrong in rotation and in position until then.
+  void sweep_told(Time end, double rotation, double position) { told_ = {end, rotation, position}; }
+
   /// What is not needed by estimates of `t` and later.
   void forget_before(Time t);
   void clear_steps() { steps_.clear(); }
@@ -45,7 +49,13 @@ class Replay {
   std::optional<Eigen::Vector3d> gyro_at(Time t) const;  // none within a gap
   FootOrientations standing_at(Time t) const;
 
+  struct Told {
+    Time until{};
+    double rotation = 0, position = 0;
+  };
+
   EstimatorConfig config_;
+  Told told_;
   Recent<ImuSample> imu_;
   Recent<LegStep> steps_;
   // Of the last seconds of the IMU.

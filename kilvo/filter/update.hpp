@@ -43,9 +43,10 @@ inline Covariance seen_at_iterate(const Covariance& P, const Eigen::Vector3d& tu
 }
 
 /// `model(iterate, prior covariance)` returns Information<N> (many rows) or Rows<N> (few rows) about the iterate. It may associate and
-/// gate anew at each iterate.
+/// gate anew at each iterate. `shared`: how the error of the prior's pose goes with noise of the pose that is common to all rows (and is
+/// in the model's R already), where what made the one made the other as well.
 template <class Model>
-Update update(const Estimate& prior, Model&& model, const UpdateConfig& config) {
+Update update(const Estimate& prior, Model&& model, const UpdateConfig& config, const PoseCovariance* shared = nullptr) {
   Update out;
   out.posterior = prior;
   State x = prior.x;
@@ -60,6 +61,12 @@ Update update(const Estimate& prior, Model&& model, const UpdateConfig& config) 
     // S = L L', W = P H' L^-T: the gain is W L^-1 and P - W W' is symmetric by construction.
     auto W = (P * rows.H.transpose()).eval();
     auto S = (rows.H * W + rows.R).eval();
+    if (shared != nullptr) {
+      // The rows measure x plus that noise: P H' + C and S + H C + C' H'.
+      const auto C = (*shared * rows.H.template leftCols<6>().transpose()).eval();
+      S += rows.H.template leftCols<6>() * C + C.transpose() * rows.H.template leftCols<6>().transpose();
+      W.template topRows<6>() += C;
+    }
     const auto llt = S.llt();
     if (llt.info() != Eigen::Success) return {prior, k, false, 0};
     llt.matrixU().template solveInPlace<Eigen::OnTheRight>(W);
@@ -71,7 +78,8 @@ Update update(const Estimate& prior, Model&& model, const UpdateConfig& config) 
     e = boxminus(x, prior.x);
     out.iterations = k;
     out.rows = static_cast<int>(count);
-    out.converged = k >= config.min_iterations && d.segment<3>(at::R).norm() < config.rotation_step && d.segment<3>(at::p).norm() < config.position_step;
+    out.converged = k >= config.min_iterations && d.segment<3>(at::R).norm() < config.rotation_step &&
+                    d.segment<3>(at::p).norm() < config.position_step;
     if (out.converged || k == config.max_iterations) {
       out.posterior.P = P;
       out.posterior.P.template selfadjointView<Eigen::Lower>().rankUpdate(W, -1.0);
