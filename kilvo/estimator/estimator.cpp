@@ -32,7 +32,7 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       config_(config),
       used_(used),
       timeline_(used, from_seconds(config.max_wait), config.wait_for_images),
-      initialiser_(config.initial, config.gravity_align),
+      initialiser_(config.initial, config.gravity_align, config.noise.accel),
       replay_(config),
       trajectory_(trajectory_length),
       map_(config.map),

@@ -16,6 +16,7 @@
 #include "kilvo/estimator/replay.hpp"
 #include "kilvo/estimator/timeline.hpp"
 #include "kilvo/filter/trajectory.hpp"
+#include "kilvo/lidar/undistort.hpp"
 #include "kilvo/map/visual_map.hpp"
 #include "kilvo/map/voxel_map.hpp"
 #include "kilvo/sensors/robot.hpp"
@@ -93,7 +94,7 @@ class Estimator {
   void lose_legs(Time t);
   bool legs_may_return(Time t);
   void stand(const ImuSample& s);  // without any other sense, a robot that stands has no velocity
-  bool register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters, const PoseCovariance& within_scan);
+  bool register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters, const UndistortionNoise& within_scan);
   bool may_learn(const Estimate& prior, const RegistrationReport& report);
   void refuse_sweep(Time t);
   void note_outage(Time sweep_begin);
