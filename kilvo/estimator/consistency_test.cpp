@@ -57,12 +57,13 @@ class GivenMapOdometry {
     const auto points = undistort(scan, trajectory_, centre, mount_, drops);
     const auto clusters = downsample(points, prior.x.pose(), lidar_.voxel_size, lidar_.reach());
     LidarModel model(map_, clusters, mount_.T_imu_lidar.p, PoseCovariance::Zero(), lidar_, workers_);
+    const UndistortionNoise within_scan = undistortion_noise(noise_, end - centre);
     const auto measured = [&](const State& x, const Covariance& P) {
       Information<6> info = model(x, P);
-      add_common_noise(undistortion_noise(noise_, end - centre).V, info);
+      add_common_noise(within_scan.V, info);
       return info;
     };
-    anchor_ = update(prior, measured, {}).posterior;
+    anchor_ = update(prior, measured, {}, &within_scan.with_prediction).posterior;
     trajectory_.correct(centre, anchor_.x.pose(), anchor_.x.v - prior.x.v);
     while (imu_.size() > 2 && imu_[1].t <= anchor_.t) imu_.pop_front();
     return anchor_;

@@ -1,5 +1,6 @@
 #include "kilvo/estimator/estimator.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -24,6 +25,9 @@ bool is_sane(const Estimate& e) {
   return is_finite(e) && e.x.v.norm() < absurd_speed && e.P.diagonal().minCoeff() > -1e-12 &&
          e.P.diagonal().segment<3>(at::p).maxCoeff() < absurd_sigma * absurd_sigma;
 }
+
+// But for rounding: what is known exactly, and feet that do not stand, have no variance.
+bool is_definite(const Covariance& P) { return P.ldlt().vectorD().minCoeff() > -1e-9; }
 
 }  // namespace
 
@@ -199,8 +203,8 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   }
 }
 
-bool Estimator::keep_finite() {
-  if (is_sane(*estimate_)) return true;
+bool Estimator::keep_finite(bool definite) {
+  if (is_sane(*estimate_) && (!definite || is_definite(estimate_->P))) return true;
   // Back to the last good state; where the robot went since, nobody knows.
   const Time t = estimate_->t;
   anchor_.t = t;

@@ -78,7 +78,7 @@ class Estimator {
   void warn_of_unused_sensors();
   void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
   bool uses(Sensor s) const { return used_[static_cast<std::size_t>(s)]; }
-  bool keep_finite();
+  bool keep_finite(bool definite = false);  // `definite`: looks at the whole covariance
   Output output_now();  // with what a sweep and an image left to go out
   void emit(std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0, double contact_us = 0);
 

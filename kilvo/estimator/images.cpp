@@ -80,7 +80,7 @@ void Estimator::process(const CameraImage& image) {
   update_config.min_iterations = model.iterations();
   update_config.max_iterations = std::max(update_config.max_iterations, model.iterations() + 2);
   estimate_ = tracks.empty() ? prior : update(prior, model, update_config).posterior;
-  if (!keep_finite()) return drop(Sensor::camera, "not finite");
+  if (!keep_finite(true)) return drop(Sensor::camera, "not finite");
   check_mount(model, prior.x.R);
   if (says_nothing(model.report())) {
     estimate_ = unlit;

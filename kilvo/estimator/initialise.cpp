@@ -22,6 +22,24 @@ Statistics3 statistics_of(const std::deque<ImuSample>& window, Member member) {
 // The resting norm is near 1: the unit is g. Rescaling to the exact norm would hide the bias, so only the unit is changed.
 double unit_of(double resting_norm) { return std::abs(resting_norm - 1.0) < 0.1 ? standard_gravity : 1.0; }
 
+// The mean specific force of a robot that moves, in the frame of the last sample: each is turned there by the gyro. Weighted by a bell over
+// the window, so that swaying and stepping, which return to where they began, leave nothing.
+Eigen::Vector3d mean_force(const std::deque<ImuSample>& window) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double weights = 0;
+  SO3 R;  // from the sample's frame to that of the last one
+  for (std::size_t i = window.size(); i-- > 0;) {
+    if (i + 1 < window.size()) {
+      const double dt = to_seconds(window[i + 1].t - window[i].t);
+      R = R * SO3::Exp(-0.5 * dt * (window[i].gyro + window[i + 1].gyro));
+    }
+    const double weight = 1 - std::cos(2 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(window.size()));
+    sum += weight * (R * window[i].accel);
+    weights += weight;
+  }
+  return sum / weights;
+}
+
 // What is known exactly still gets this much, so that the covariance stays positive definite: 10 micrometres, 10 microradians.
 constexpr double floor_variance = 1e-10;
 
@@ -47,6 +65,8 @@ std::string Initialiser::waiting_for() const {
 std::optional<Start> Initialiser::add(const ImuSample& s) {
   if (!first_) first_ = s.t;
   window_.push_back(s);
+  moving_.push_back(s);
+  while (s.t - moving_.front().t > from_seconds(config_.moving_start)) moving_.pop_front();
   // The shortest run of samples that spans still_time.
   while (window_.size() > 2 && s.t - window_[1].t >= from_seconds(config_.still_time)) window_.pop_front();
   constexpr std::size_t min_samples = 20;
@@ -70,7 +90,7 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
 
 Start Initialiser::start(bool still) const {
   const Eigen::Vector3d gyro = statistics_of(window_, &ImuSample::gyro).mean;
-  Eigen::Vector3d accel = statistics_of(window_, &ImuSample::accel).mean;
+  Eigen::Vector3d accel = still ? statistics_of(window_, &ImuSample::accel).mean : mean_force(moving_);
   Start out;
   out.still = still;
   out.resting_norm = accel.norm();
@@ -85,7 +105,8 @@ Start Initialiser::start(bool still) const {
   e.x.g = -standard_gravity * up_W;
 
   // The world is fixed by the first pose. Gravity carries the tilt: two directions, and at rest the accelerometer bias turns with it.
-  const double tilt = still ? config_.gravity_sigma : 1.0;
+  constexpr double moving_tilt = 0.4;  // m/s^2: who sets off changes his velocity by this much a second
+  const double tilt = still ? config_.gravity_sigma : moving_tilt;
   const Eigen::Matrix3d horizontal = Eigen::Matrix3d::Identity() - up_W * up_W.transpose();
   const Eigen::Matrix3d gravity = tilt * tilt * horizontal;
   const Eigen::Matrix3d Rt = e.x.R.matrix().transpose();

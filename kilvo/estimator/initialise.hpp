@@ -36,7 +36,8 @@ class Initialiser {
   InitialConfig config_;
   bool gravity_align_;
   double accel_noise_;
-  std::deque<ImuSample> window_;
+  std::deque<ImuSample> window_;  // of still_time
+  std::deque<ImuSample> moving_;  // of moving_start
   std::optional<Time> first_;
 };
 

@@ -83,6 +83,30 @@ TEST(Initialiser, RefusesMotionAndThenStartsMovingWithWideUncertainties) {
   EXPECT_GE(start->estimate.P(at::v, at::v), 1.0);
 }
 
+// It sways by 10 degrees and steps with 3 m/s^2, turning all the while: at the last sample it knows where up is all the same.
+TEST(Initialiser, OnTheMoveGravityIsWhatIsLeftWhenTheMotionHasCancelled) {
+  Initialiser initialiser(InitialConfig{}, false, ProcessNoise{}.accel);
+  const auto attitude = [](double s) {
+    return SO3::Exp({0, 0, 0.4 * s}) * SO3::Exp(Eigen::Vector3d(0.17 * std::sin(6 * s), 0.1 * std::cos(12 * s), 0));
+  };
+  std::optional<Start> start;
+  double s = 0;
+  for (; !start && s < 5; s += 0.005) {
+    ImuSample sample;
+    sample.t = time_from_ns(0) + from_seconds(s);
+    sample.gyro = (attitude(s - 1e-4).inverse() * attitude(s + 1e-4)).Log() / 2e-4;
+    sample.accel = attitude(s).inverse() * Eigen::Vector3d(3 * std::sin(12 * s), 1.5 * std::cos(6 * s), standard_gravity + 3 * std::cos(12 * s));
+    start = initialiser.add(sample);
+  }
+  ASSERT_TRUE(start);
+  ASSERT_FALSE(start->still);
+  const Eigen::Vector3d up_I = attitude(s - 0.005).inverse() * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d found_I = -(start->estimate.x.R.inverse() * start->estimate.x.g).normalized();
+  EXPECT_LT(std::acos(up_I.dot(found_I)), 0.5 * std::numbers::pi / 180);
+  const Eigen::Matrix3d P = start->estimate.P.block<3, 3>(at::g, at::g);
+  EXPECT_GT(P.trace(), 2 * 0.2 * 0.2) << "it may have been setting off";
+}
+
 TEST(Initialiser, WithoutGravityAlignmentTheWorldIsTheFirstImuFrame) {
   const auto start = start_from(Eigen::Vector3d::Zero(), {0, 5.0, 8.4}, 0, 5, false);
   ASSERT_TRUE(start);

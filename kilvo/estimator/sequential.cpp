@@ -111,7 +111,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
     refuse_sweep(end);
     return replay_.advance(*estimate_, end, &trajectory_);
   }
-  const bool good = keep_finite();
+  const bool good = keep_finite(true);
   StageTimes stages;
   stages.lidar_us = watch.lap_us();
 
