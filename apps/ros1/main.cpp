@@ -1,0 +1,96 @@
+// kilvo_node: KILVO for ROS 1.
+#include <fmt/core.h>
+#include <ros/init.h>
+#include <ros/master.h>
+#include <ros/node_handle.h>
+
+#include <csignal>
+#include <ctime>
+#include <exception>
+
+#include "apps/ros1/node.hpp"
+
+namespace {
+
+using namespace kilvo;
+
+enum ExitCode : int { done = 0, run_failed = 1, wrong_usage = 2 };
+
+/// SIGINT and SIGTERM as a question that the main thread asks. Made before any other thread, so that none of them takes the signal.
+class StopSignals {
+ public:
+  StopSignals() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+  }
+  /// Waits for one, or for so long, ns below a second.
+  bool came_within(long nanoseconds) const {
+    const timespec time{0, nanoseconds};
+    return sigtimedwait(&signals_, nullptr, &time) >= 0;
+  }
+
+ private:
+  sigset_t signals_{};
+};
+
+// Without a master there are no parameters to read.
+bool wait_for_master(const StopSignals& stop) {
+  constexpr int tries_a_message = 50;
+  for (int tried = 0; !ros::master::check(); ++tried) {
+    if (tried % tries_a_message == 0) fmt::print(stderr, "kilvo_node: waiting for a ROS master at {} (is roscore running?)\n", ros::master::getURI());
+    if (stop.came_within(200'000'000)) return false;
+  }
+  return true;
+}
+
+lab::Settings load(const ros1::Parameters& parameters) {
+  lab::Settings settings = lab::load_settings(parameters.config, parameters.overrides);
+  std::vector<Sensor> used;
+  for (int i = 0; i < sensor_count; ++i) {
+    if (settings.has(static_cast<Sensor>(i))) used.push_back(static_cast<Sensor>(i));
+  }
+  if (used.empty() || used.front() != Sensor::imu)
+    throw lab::ConfigError(parameters.config + ": imu.topic is missing: nothing is estimated without the IMU");
+  lab::require_complete(settings, used);
+  // As `kilvo run --realtime`: on a robot the other cores are for others.
+  if (!settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
+  if (!settings.given.contains("estimator.threads")) settings.estimator.threads = 1;
+  return settings;
+}
+
+int run(int argc, char** argv) {
+  const StopSignals stop;
+  ros::init(argc, argv, "kilvo", ros::init_options::NoSigintHandler);
+  if (argc > 1) {
+    fmt::print(stderr, "kilvo_node: '{}' is not understood: parameters are given as _config:=FILE, or by a launch file\n", argv[1]);
+    return wrong_usage;
+  }
+  if (!wait_for_master(stop)) return done;
+  ros::NodeHandle node, own("~");
+  const ros1::Parameters parameters = ros1::read_parameters(own);
+  {
+    ros1::Node kilvo(parameters, load(parameters));
+    while (ros::ok() && !stop.came_within(100'000'000)) kilvo.tick();
+  }
+  ros::shutdown();
+  return done;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const kilvo::ros1::ParameterError& error) {
+    fmt::print(stderr, "kilvo_node: {}\n", error.what());
+    return wrong_usage;
+  } catch (const kilvo::lab::ConfigError& error) {
+    fmt::print(stderr, "kilvo_node: {}\n", error.what());
+    return wrong_usage;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "kilvo_node: {}\n", error.what());
+    return run_failed;
+  }
+}
