@@ -1,10 +1,9 @@
 // A message of any type as it came over the wire: KILVO's own decoders read it, by the name of its type.
 #pragma once
 
+#include <cstdint>
 #include <ros/message_traits.h>
 #include <ros/serialization.h>
-
-#include <cstdint>
 #include <vector>
 
 namespace kilvo::ros1 {

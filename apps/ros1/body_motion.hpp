@@ -11,7 +11,7 @@ namespace kilvo::ros1 {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 struct BodyMotion {
-  SE3 pose;                     // T_WB
+  SE3 pose;                      // T_WB
   Eigen::Vector3d v_B, omega_B;  // of the base relative to the world, in the base's own axes, m/s, rad/s
   Matrix6 pose_covariance;       // of (x, y, z, rotation about the world's fixed x, y, z)
   Matrix6 twist_covariance;      // of (v_B, omega_B)

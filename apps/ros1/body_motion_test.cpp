@@ -1,8 +1,7 @@
 #include "apps/ros1/body_motion.hpp"
 
-#include <gtest/gtest.h>
-
 #include <Eigen/Cholesky>
+#include <gtest/gtest.h>
 #include <random>
 
 namespace kilvo::ros1 {

@@ -1,8 +1,7 @@
 #include "apps/ros1/diagnostics.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
+#include <fmt/core.h>
 
 namespace kilvo::ros1 {
 namespace {
@@ -79,7 +78,8 @@ DiagnosticStatus status_of_estimate(const Condition& c) {
   std::string lost;
   for (int i = 0; i < sensor_count; ++i) {
     const auto sensor = static_cast<Sensor>(i);
-    if (!c.inputs[static_cast<std::size_t>(i)].topic.empty() && trouble_of(sensor, c)) lost += (lost.empty() ? "" : ", ") + std::string(name_of(sensor));
+    if (!c.inputs[static_cast<std::size_t>(i)].topic.empty() && trouble_of(sensor, c))
+      lost += (lost.empty() ? "" : ", ") + std::string(name_of(sensor));
   }
   const EstimateState& e = *c.estimate;
   std::uint8_t level = lost.empty() ? DiagnosticStatus::OK : DiagnosticStatus::WARN;

@@ -1,12 +1,11 @@
 // kilvo_node: KILVO for ROS 1.
+#include <csignal>
+#include <ctime>
+#include <exception>
 #include <fmt/core.h>
 #include <ros/init.h>
 #include <ros/master.h>
 #include <ros/node_handle.h>
-
-#include <csignal>
-#include <ctime>
-#include <exception>
 
 #include "apps/ros1/node.hpp"
 
@@ -39,7 +38,8 @@ class StopSignals {
 bool wait_for_master(const StopSignals& stop) {
   constexpr int tries_a_message = 50;
   for (int tried = 0; !ros::master::check(); ++tried) {
-    if (tried % tries_a_message == 0) fmt::print(stderr, "kilvo_node: waiting for a ROS master at {} (is roscore running?)\n", ros::master::getURI());
+    if (tried % tries_a_message == 0)
+      fmt::print(stderr, "kilvo_node: waiting for a ROS master at {} (is roscore running?)\n", ros::master::getURI());
     if (stop.came_within(200'000'000)) return false;
   }
   return true;

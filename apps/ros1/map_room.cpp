@@ -8,13 +8,12 @@
 namespace kilvo::ros1 {
 namespace {
 
-constexpr std::size_t most_waiting = 64;     // sweeps and images: some seconds, while a map is written
+constexpr std::size_t most_waiting = 64;  // sweeps and images: some seconds, while a map is written
 constexpr std::uint32_t most_unsent = 4;  // clouds
 
 }  // namespace
 
-MapRoom::MapRoom(const Names& names, const lab::MappingConfig& config)
-    : config_(config), frame_(names.map_frame), map_(config) {
+MapRoom::MapRoom(const Names& names, const lab::MappingConfig& config) : config_(config), frame_(names.map_frame), map_(config) {
   ros::NodeHandle node;
   cloud_ = node.advertise<CloudMessage>(ros::names::resolve(names.cloud), most_unsent);
   coloured_ = node.advertise<CloudMessage>(ros::names::resolve(names.coloured), most_unsent);
@@ -57,8 +56,7 @@ void MapRoom::run() {
 
 void MapRoom::put(const Output& output) {
   if (output.is_sweep && cloud_.getNumSubscribers() > 0) cloud_.publish(cloud_message(output.points_W, output.t, frame_));
-  if (!output.coloured.empty() && coloured_.getNumSubscribers() > 0)
-    coloured_.publish(cloud_message(output.coloured, output.t, frame_));
+  if (!output.coloured.empty() && coloured_.getNumSubscribers() > 0) coloured_.publish(cloud_message(output.coloured, output.t, frame_));
   const std::lock_guard lock(map_mutex_);
   if (output.is_sweep) map_.add(output.points_W);
   if (!output.coloured.empty()) map_.colour(output.coloured);

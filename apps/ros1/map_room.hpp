@@ -1,12 +1,11 @@
 // What takes time and nobody waits for: sweeps and images become clouds for others and the map that is saved, on a thread of its own.
 #pragma once
 
-#include <ros/node_handle.h>
-
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <mutex>
+#include <ros/node_handle.h>
 #include <string>
 #include <thread>
 

@@ -1,10 +1,8 @@
 #include "apps/ros1/node.hpp"
 
-#include <boost/function.hpp>
-#include <fmt/core.h>
-#include <ros/console.h>
-
 #include <filesystem>
+#include <fmt/core.h>
+#include <ros/ros.h>
 
 #include "lab/mapping/output_error.hpp"
 
@@ -108,7 +106,9 @@ void Node::offer_services() {
   ros::NodeHandle own("~");
   own.setCallbackQueue(&service_queue_);
   const auto trigger = [&](const std::string& name, bool (Node::*what)(TriggerAnswer&)) {
-    const boost::function<bool(Trigger&, TriggerAnswer&)> call = [this, what](Trigger&, TriggerAnswer& answer) { return (this->*what)(answer); };
+    const boost::function<bool(Trigger&, TriggerAnswer&)> call = [this, what](Trigger&, TriggerAnswer& answer) {
+      return (this->*what)(answer);
+    };
     services_.push_back(own.advertiseService<Trigger, TriggerAnswer>(name, call));
   };
   trigger("save_map", &Node::save_map);

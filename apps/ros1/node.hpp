@@ -1,11 +1,10 @@
 // The node: what comes on the topics goes through the live runner, what it says goes out.
 #pragma once
 
-#include <ros/node_handle.h>
-
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <ros/node_handle.h>
 #include <shared_mutex>
 #include <string>
 #include <vector>

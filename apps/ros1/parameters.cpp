@@ -1,10 +1,8 @@
 #include "apps/ros1/parameters.hpp"
 
-#include <xmlrpcpp/XmlRpcValue.h>
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
+#include <fmt/core.h>
 
 #include "lab/settings/nearest.hpp"
 

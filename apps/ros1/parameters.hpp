@@ -2,7 +2,6 @@
 #pragma once
 
 #include <ros/node_handle.h>
-
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -16,8 +15,8 @@ struct ParameterError : std::runtime_error {
 
 /// How topics and frames are called. The first ones: of the best estimate; `smooth`: of the one without steps.
 struct Names {
-  std::string map_frame = "map";        // the best estimate's world: corrections are steps
-  std::string odom_frame = "odom";      // the smooth one's (REP 105)
+  std::string map_frame = "map";    // the best estimate's world: corrections are steps
+  std::string odom_frame = "odom";  // the smooth one's (REP 105)
   std::string base_frame = "base_link";
   std::string odometry = "~odometry", smooth = "~odometry_smooth", path = "~path", cloud = "~cloud", coloured = "~cloud_coloured",
               contacts = "~contacts";

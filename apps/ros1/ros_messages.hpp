@@ -3,6 +3,7 @@
 #pragma once
 
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <memory>
 #include <nav_msgs/Odometry.h>
 #include <nav_msgs/Path.h>
 #include <ros/service_traits.h>
@@ -13,8 +14,6 @@
 #include <std_srvs/TriggerRequest.h>
 #include <std_srvs/TriggerResponse.h>
 #include <tf2_msgs/TFMessage.h>
-
-#include <memory>
 
 #include "kilvo/sensors/time.hpp"
 

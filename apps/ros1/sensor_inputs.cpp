@@ -1,8 +1,7 @@
 #include "apps/ros1/sensor_inputs.hpp"
 
-#include <boost/function.hpp>
 #include <fmt/core.h>
-#include <ros/console.h>
+#include <ros/ros.h>
 
 #include "apps/ros1/ros_messages.hpp"
 #include "lab/messages/message_decoder.hpp"
@@ -30,10 +29,7 @@ std::string accepted_text(Sensor sensor) {
 }  // namespace
 
 SensorInputs::SensorInputs(const lab::Settings& settings, bool no_deskew, Sink sink)
-    : sink_(std::move(sink)),
-      lidar_rate_(settings.robot.lidar.rate),
-      fast_spinner_(1, &fast_queue_),
-      slow_spinner_(1, &slow_queue_) {
+    : sink_(std::move(sink)), lidar_rate_(settings.robot.lidar.rate), fast_spinner_(1, &fast_queue_), slow_spinner_(1, &slow_queue_) {
   if (no_deskew) point_time_.emplace();
   for (int i = 0; i < sensor_count; ++i) {
     if (settings.has(static_cast<Sensor>(i))) subscribe(static_cast<Sensor>(i), settings);
@@ -66,7 +62,8 @@ void SensorInputs::subscribe(Sensor sensor, const lab::Settings& settings) {
     return node_.subscribe(options);
   };
   input.subscriber = to(input.topic, false);
-  if (sensor == Sensor::camera && !input.topic.ends_with("/compressed")) input.compressed = to(fmt::format("{}/compressed", input.topic), true);
+  if (sensor == Sensor::camera && !input.topic.ends_with("/compressed"))
+    input.compressed = to(fmt::format("{}/compressed", input.topic), true);
 }
 
 void SensorInputs::receive(Sensor sensor, bool is_compressed, const Event& event) {

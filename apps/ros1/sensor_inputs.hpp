@@ -1,16 +1,15 @@
 // From the topics that the configuration names to measurements. A topic may come late, stop and come back: ROS connects by itself.
 #pragma once
 
-#include <ros/callback_queue.h>
-#include <ros/node_handle.h>
-#include <ros/spinner.h>
-
 #include <array>
 #include <atomic>
 #include <chrono>
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <ros/spinner.h>
 #include <string>
 #include <vector>
 

@@ -1,8 +1,7 @@
 #include "apps/ros1/state_outlet.hpp"
 
-#include <ros/names.h>
-
 #include <algorithm>
+#include <ros/names.h>
 
 namespace kilvo::ros1 {
 namespace {
@@ -114,7 +113,8 @@ void StateOutlet::publish_transforms(const BodyMotion& best, const BodyMotion& s
   transforms_.publish(message);
 }
 
-// position: clearance, m; effort: 1 while the foot stands, 0 while it does not; velocity: how far it is from standing still, above 10: it moves.
+// position: clearance, m; effort: 1 while the foot stands, 0 while it does not; velocity: how far it is from standing still, above 10: it
+// moves.
 void StateOutlet::publish_contacts(const Contacts& contacts) {
   JointMessage message;
   address(message.header, contacts.t, names_.map_frame);

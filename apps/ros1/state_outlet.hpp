@@ -1,10 +1,9 @@
 // Each state, as it comes, to who listens: odometry, transforms, contacts; and the way so far.
 #pragma once
 
-#include <ros/node_handle.h>
-
 #include <mutex>
 #include <optional>
+#include <ros/node_handle.h>
 #include <string>
 
 #include "apps/ros1/body_motion.hpp"

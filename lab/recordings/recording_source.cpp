@@ -88,7 +88,8 @@ std::vector<std::string> RecordingSource::warnings() const {
     if (topic.empty()) continue;
     if (counts.used == 0 && counts.dropped.empty()) texts.push_back(topic + ": no messages");
     if (counts.dropped.contains("undecodable")) {
-      texts.push_back(topic + ": " + plural(counts.dropped.at("undecodable"), "message") + " not decodable; the first: " + intakes_[i].first_fault());
+      texts.push_back(topic + ": " + plural(counts.dropped.at("undecodable"), "message") +
+                      " not decodable; the first: " + intakes_[i].first_fault());
     }
     if (counts.dropped.contains("too_large")) {
       texts.push_back(topic + ": " + plural(counts.dropped.at("too_large"), "message") + " of more than " +
