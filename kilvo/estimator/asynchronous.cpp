@@ -34,6 +34,7 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
     closed_ = *estimate_;
   }
   Stopwatch watch;
+  replay_.remember(closed_);
   replay_.advance(closed_, s.t, &trajectory_);
   estimate_ = closed_;
   closing_us_ = last_legs_ ? closing_us_ + watch.lap_us() : 0;

@@ -33,14 +33,17 @@ bool Forerunner::push(const ImuSample& raw) {
   ImuSample s = raw;
   s.accel *= accel_scale_;
   replay_.add(s);
-  if (last_legs_ && !are_legs_overdue(s.t - *last_legs_, leg_rate_, leg_period_)) return false;
+  if (last_legs_ && !are_legs_overdue(s.t - *last_legs_ - lag_, leg_rate_, leg_period_)) return false;
   close(s.t);
   with_legs_ = false;
   return true;
 }
 
 bool Forerunner::push(const Feet& feet) {
-  if (!started_ || imu_lost_ || !last_legs_ || feet.t <= *last_legs_ || feet.t < closed_.t) return false;
+  if (!started_ || imu_lost_) return false;
+  // The most of lately: it is smallest just before an IMU sample.
+  lag_ = std::max(lag_ - lag_ / 256, replay_.newest_imu().t - feet.t);
+  if (!last_legs_ || feet.t <= *last_legs_ || feet.t < closed_.t) return false;
   if (to_seconds(feet.t - replay_.newest_imu().t) > longest_held_imu(imu_rate_)) return false;
   if (feet.t - *last_legs_ > silence_of_legs(leg_rate_)) {
     last_legs_.reset();  // they come again: how, the estimator decides

@@ -53,6 +53,7 @@ class Forerunner {
   const char* cause_ = "start";
   PoseCovariance map_error_ = PoseCovariance::Zero();
 
+  Duration lag_{};                  // by which the leg samples' stamps trail the IMU's as they arrive
   bool with_legs_ = false;          // the newest output is of a leg sample
   double kinematic_us_ = 0, contact_us_ = 0;  // what that took
 };

@@ -60,7 +60,7 @@ void Estimator::process(const CameraImage& image) {
   if (recovery_.sweeps_to_go > 0) return drop(Sensor::camera, "before the map is joined again");
   Stopwatch watch;
   const std::vector<GreyImage> pyramid = pyramid_of(to_grey(image.image), Patch::levels);
-  Estimate prior = anchor_;
+  Estimate prior = replay_.nearest(image.t, anchor_);
   replay_.advance(prior, image.t, &trajectory_);
   if (is_lost_among_patches(prior)) return drop(Sensor::camera, "the pose is too uncertain");
   const SE3 expected = T_CI_ * prior.x.pose().inverse();

@@ -23,8 +23,8 @@ void Replay::add(const ImuSample& s) {
 
 // Beyond the end of its range an IMU may have seen anything of the same size.
 void Replay::say_clipped(ImuInterval& interval) const {
-  constexpr double gyro = 3, accel = 20;     // rad/s, m/s^2: what may be missing
-  constexpr double correlation = 0.01;       // s: it stays missing for so long
+  constexpr double gyro = 3, accel = 20;  // rad/s, m/s^2: what may be missing
+  constexpr double correlation = 0.01;    // s: it stays missing for so long
   interval.gyro_scale = gyro * gyro * correlation / (config_.noise.gyro * config_.noise.gyro);
   interval.accel_scale = accel * accel * correlation / (config_.noise.accel * config_.noise.accel);
 }
@@ -52,7 +52,7 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   interval.gyro_scale = gyro2 * gap / (config_.noise.gyro * config_.noise.gyro);
   interval.accel_scale = accel2 * gap / (config_.noise.accel * config_.noise.accel);
   if (gap > blind_gap) interval.accel_scale = 1;  // more is added after the prediction (widen)
-  constexpr double told_by_its_ends = 0.25;  // s
+  constexpr double told_by_its_ends = 0.25;       // s
   if (gap > told_by_its_ends) {
     // The two samples say nothing of the time between.
     interval.gyro_scale = 1;
@@ -145,7 +145,7 @@ Time Replay::newest_imu_by(Time t) const {
 
 void Replay::copy_since(Time t, const Replay& other) {
   imu_.clear();
-  steps_.clear();
+  clear_steps();
   // What forget_before would leave.
   for (std::size_t i = 0; i < other.imu_.size(); ++i) {
     if (i + 2 >= other.imu_.size() || other.imu_[i + 1].t > t) imu_.push_back(other.imu_[i]);
@@ -159,7 +159,18 @@ void Replay::copy_since(Time t, const Replay& other) {
   accel_variance_ = other.accel_variance_;
 }
 
+void Replay::remember(const Estimate& e) {
+  constexpr Duration apart = std::chrono::milliseconds(4);
+  if (remembered_.size() < most_remembered && (remembered_.empty() || e.t - remembered_.back().t >= apart)) remembered_.push_back(e);
+}
+
+const Estimate& Replay::nearest(Time t, const Estimate& oldest) const {
+  const auto after = std::upper_bound(remembered_.begin(), remembered_.end(), t, [](Time value, const Estimate& e) { return value < e.t; });
+  return after == remembered_.begin() ? oldest : *(after - 1);
+}
+
 void Replay::forget_before(Time t) {
+  remembered_.clear();
   while (imu_.size() > 2 && imu_[1].t <= t) imu_.pop_front();
   while (steps_.size() > 1 && steps_[1].t <= t) steps_.pop_front();
 }

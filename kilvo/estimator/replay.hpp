@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "kilvo/estimator/config.hpp"
 #include "kilvo/estimator/recent.hpp"
@@ -13,7 +14,7 @@ namespace kilvo {
 
 class Replay {
  public:
-  explicit Replay(const EstimatorConfig& config) : config_(config) {}
+  explicit Replay(const EstimatorConfig& config) : config_(config) { remembered_.reserve(most_remembered); }
 
   /// In time order, each kind by itself.
   void add(const ImuSample& s);
@@ -37,13 +38,22 @@ class Replay {
   /// Applies one leg step to e, which must be of its time. Returns which feet of it were used and not refused.
   std::array<bool, 2> apply(Estimate& e, const LegStep& step) const;
 
-  /// What is not needed by estimates of `t` and later.
+  /// `e` came from the oldest estimate that will be replayed by advance(): a way to a later time may begin there instead.
+  void remember(const Estimate& e);
+  /// The last estimate remembered that is not later than `t`, else `oldest`.
+  const Estimate& nearest(Time t, const Estimate& oldest) const;
+
+  /// What is not needed by estimates of `t` and later; nothing that was remembered, for `t` has another estimate now.
   void forget_before(Time t);
   /// Becomes what `other` still knows that estimates of `t` and later need. Allocates only when it has never held so much.
   void copy_since(Time t, const Replay& other);
-  void clear_steps() { steps_.clear(); }
+  void clear_steps() {
+    steps_.clear();
+    remembered_.clear();
+  }
 
  private:
+  static constexpr std::size_t most_remembered = 100;
   void say_clipped(ImuInterval& interval) const;
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
   std::optional<Eigen::Vector3d> gyro_at(Time t) const;  // none within a gap
@@ -52,6 +62,7 @@ class Replay {
   EstimatorConfig config_;
   Recent<ImuSample> imu_;
   Recent<LegStep> steps_;
+  std::vector<Estimate> remembered_;
   // Of the last seconds of the IMU.
   Eigen::Vector3d gyro_mean_ = Eigen::Vector3d::Zero(), accel_mean_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d gyro_variance_ = Eigen::Vector3d::Zero(), accel_variance_ = Eigen::Vector3d::Zero();

@@ -78,9 +78,9 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
   // the sweep cancels to first order. What came since is replayed.
   const Time centre = std::max(anchor_.t, end - (end - begin_of(scan)) / 2);
-  Estimate prior = anchor_;
+  Estimate prior = replay_.nearest(centre, anchor_);
   replay_.advance(prior, centre, &trajectory_);
-  Estimate ahead = prior;
+  Estimate ahead = replay_.nearest(end, prior);
   replay_.advance(ahead, end, &trajectory_);
   const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
   const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size, config_.lidar.reach());

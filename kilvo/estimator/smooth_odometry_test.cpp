@@ -38,7 +38,8 @@ TEST(SmoothOdometry, AJumpOfTheEstimateIsBledInWithoutAStep) {
   for (const double period : {0.001, 0.005}) {
     SmoothOdometry smooth(0.5);
     SE3 before;
-    for (double s = 0; s < 8; s += period) {
+    for (int i = 0; i < std::lround(8 / period); ++i) {
+      const double s = i * period;
       const Output o = on_circle(s, jump);
       const SE3 pose = smooth.add(o);
       if (s > 0) {

@@ -77,7 +77,7 @@ TEST(Timeline, OnlyAScanWaitsForImagesAndOnlyForThoseBeforeItsMiddle) {
 TEST(Timeline, ALateScanOrImageGoesNext) {
   CameraImage image;
   image.t = time_from_ns(0) + from_seconds(0.9);
-  Timeline timeline({true, false, false, true}, from_seconds(0.2));
+  Timeline timeline({true, false, false, true}, from_seconds(0.2), false);
   for (const double s : {0.8, 1.0}) EXPECT_FALSE(timeline.push(imu_at(s)));
   EXPECT_EQ(all_from(timeline).size(), 2u);
   EXPECT_FALSE(timeline.push(image));

@@ -15,6 +15,7 @@ namespace kilvo {
 /// Few rows: residual r, Jacobian H over the whole error state, covariance R of the rows. At most `Max` rows; no allocation.
 template <int Max>
 struct Rows {
+  static constexpr int most = Max;
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Max, 1> r;
   Eigen::Matrix<double, Eigen::Dynamic, at::size, Eigen::RowMajor, Max, at::size> H;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, Max, Max> R;
@@ -23,6 +24,7 @@ struct Rows {
 /// Many rows, summed: A = sum H' R^-1 H, b = sum H' R^-1 r over the `N` columns of the error state that they touch.
 template <int N>
 struct Information {
+  static constexpr int most = N;  // rows, when it is turned into some
   std::array<int, N> columns{};
   Eigen::Matrix<double, N, N> A = Eigen::Matrix<double, N, N>::Zero();
   Eigen::Matrix<double, N, 1> b = Eigen::Matrix<double, N, 1>::Zero();

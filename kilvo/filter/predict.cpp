@@ -1,6 +1,9 @@
 #include "kilvo/filter/predict.hpp"
 
+#include <array>
 #include <cassert>
+
+#include "kilvo/filter/gain.hpp"
 
 namespace kilvo {
 namespace {
@@ -51,6 +54,26 @@ ForceJacobians jacobians_of(const State& x, const Motion& m) {
   return j;
 }
 
+constexpr int moving = 9;  // rows of the error state that an interval moves: R, p, v
+using MovingRows = Eigen::Matrix<double, moving, at::size, Eigen::RowMajor>;
+
+// out = F P F', where F is the identity below its first rows. Each row of F P is a sum of columns of P, which is symmetric.
+void move(const Covariance& P, const MovingRows& F, Covariance& out) {
+  out.rightCols<at::size - moving>() = P.rightCols<at::size - moving>();
+  times_rows(P, F.data(), moving, out.data());
+  std::array<double, static_cast<std::size_t>(moving * moving)> N{};  // F P F' of those rows
+  for (int k = 0; k < moving; ++k) {
+    for (int j = 0; j < at::size; ++j) {
+      if (F(k, j) == 0) continue;
+      for (int i = 0; i <= k; ++i) N[static_cast<std::size_t>(k * moving + i)] += F(k, j) * out(j, i);
+    }
+  }
+  for (int k = 0; k < moving; ++k) {
+    for (int i = 0; i <= k; ++i) out(i, k) = out(k, i) = N[static_cast<std::size_t>(k * moving + i)];
+    for (int j = moving; j < at::size; ++j) out(k, j) = out(j, k);
+  }
+}
+
 void add_process_noise(Covariance& P, const Motion& m, const Eigen::Vector3d& up_W, const FootOrientations& feet, const ProcessNoise& n,
                        const ImuInterval& interval) {
   const double dt = m.dt;
@@ -99,37 +122,25 @@ Estimate predict(const Estimate& e, const ImuInterval& interval, const FootOrien
   out.t = interval.end;
   out.x = mean_after(e.x, m);
 
-  // F differs from the identity only in the rows of R, p, v; M = F P for those nine rows.
-  const Eigen::Matrix3d R_R = m.turn.matrix().transpose();
-  const Eigen::Matrix3d R_bg = -j.Jr * dt;
-  const Eigen::Matrix3d v_R = 0.5 * dt * (j.f0_theta + j.f1_theta);
-  const Eigen::Matrix3d v_bg = 0.5 * dt * j.f1_bg;
-  const Eigen::Matrix3d v_ba = -0.5 * dt * (e.x.R.matrix() + m.R1.matrix());
-  const Eigen::Matrix3d p_R = dt2 * (j.f0_theta / 3.0 + j.f1_theta / 6.0);
-  const Eigen::Matrix3d p_bg = (dt2 / 6.0) * j.f1_bg;
-  const Eigen::Matrix3d p_ba = -dt2 * (e.x.R.matrix() / 3.0 + m.R1.matrix() / 6.0);
-
-  const auto rows = [&e](int block) { return e.P.middleRows<3>(block); };
-  Eigen::Matrix<double, 9, at::size> M;
-  M.middleRows<3>(at::R).noalias() = R_R * rows(at::R) + R_bg * rows(at::bg);
-  M.middleRows<3>(at::p).noalias() = p_R * rows(at::R) + p_bg * rows(at::bg) + p_ba * rows(at::ba);
-  M.middleRows<3>(at::p) += rows(at::p) + dt * rows(at::v) + (0.5 * dt2) * rows(at::g);
-  M.middleRows<3>(at::v).noalias() = v_R * rows(at::R) + v_bg * rows(at::bg) + v_ba * rows(at::ba);
-  M.middleRows<3>(at::v) += rows(at::v) + dt * rows(at::g);
-
-  // M F' for the nine columns that change; the others are M as it is.
-  const auto cols = [&M](int block) { return M.middleCols<3>(block); };
-  Eigen::Matrix<double, 9, 9> N;
-  N.middleCols<3>(at::R).noalias() = cols(at::R) * R_R.transpose() + cols(at::bg) * R_bg.transpose();
-  N.middleCols<3>(at::p).noalias() = cols(at::R) * p_R.transpose() + cols(at::bg) * p_bg.transpose() + cols(at::ba) * p_ba.transpose();
-  N.middleCols<3>(at::p) += cols(at::p) + dt * cols(at::v) + (0.5 * dt2) * cols(at::g);
-  N.middleCols<3>(at::v).noalias() = cols(at::R) * v_R.transpose() + cols(at::bg) * v_bg.transpose() + cols(at::ba) * v_ba.transpose();
-  N.middleCols<3>(at::v) += cols(at::v) + dt * cols(at::g);
-
-  out.P = e.P;
-  out.P.topRightCorner<9, at::size - 9>() = M.rightCols<at::size - 9>();
-  out.P.bottomLeftCorner<at::size - 9, 9>() = M.rightCols<at::size - 9>().transpose();
-  out.P.topLeftCorner<9, 9>() = 0.5 * (N + N.transpose());
+  // F differs from the identity only in the rows of R, p, v.
+  const Eigen::Matrix3d& R0 = e.x.R.matrix();
+  const Eigen::Matrix3d& R1 = m.R1.matrix();
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  MovingRows F = MovingRows::Zero();
+  F.block<3, 3>(at::R, at::R) = m.turn.matrix().transpose();
+  F.block<3, 3>(at::R, at::bg) = -j.Jr * dt;
+  F.block<3, 3>(at::p, at::R) = dt2 * (j.f0_theta / 3.0 + j.f1_theta / 6.0);
+  F.block<3, 3>(at::p, at::p) = I;
+  F.block<3, 3>(at::p, at::v) = dt * I;
+  F.block<3, 3>(at::p, at::bg) = (dt2 / 6.0) * j.f1_bg;
+  F.block<3, 3>(at::p, at::ba) = -dt2 * (R0 / 3.0 + R1 / 6.0);
+  F.block<3, 3>(at::p, at::g) = (0.5 * dt2) * I;
+  F.block<3, 3>(at::v, at::R) = 0.5 * dt * (j.f0_theta + j.f1_theta);
+  F.block<3, 3>(at::v, at::v) = I;
+  F.block<3, 3>(at::v, at::bg) = 0.5 * dt * j.f1_bg;
+  F.block<3, 3>(at::v, at::ba) = -0.5 * dt * (R0 + R1);
+  F.block<3, 3>(at::v, at::g) = dt * I;
+  move(e.P, F, out.P);
   add_process_noise(out.P, m, -e.x.g.normalized(), feet, noise, interval);
   return out;
 }

@@ -34,7 +34,8 @@ ErrorVector boxminus(const State& a, const State& b) {
 
 bool is_finite(const Estimate& e) {
   return e.x.R.matrix().allFinite() && e.x.p.allFinite() && e.x.v.allFinite() && e.x.bg.allFinite() && e.x.ba.allFinite() &&
-         e.x.g.allFinite() && e.x.pc[0].allFinite() && e.x.pc[1].allFinite() && std::isfinite(e.x.tau) && e.P.allFinite();
+         e.x.g.allFinite() && e.x.pc[0].allFinite() && e.x.pc[1].allFinite() && std::isfinite(e.x.tau) &&
+         (0 * e.P).sum() == 0;  // zero times what is not finite is not a number
 }
 
 }  // namespace kilvo

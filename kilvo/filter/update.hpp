@@ -3,9 +3,9 @@
 // of the measurement is inverted, so both may be singular: a pose that is known, a direction that nobody measures.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <tuple>
 
+#include "kilvo/filter/gain.hpp"
 #include "kilvo/filter/measurement_rows.hpp"
 #include "kilvo/filter/state.hpp"
 #include "kilvo/math/field.hpp"
@@ -39,6 +39,7 @@ inline Covariance seen_at_iterate(const Covariance& P, const Eigen::Vector3d& tu
   Covariance Q = P;
   Q.middleRows<3>(at::R) = J_inverse * P.middleRows<3>(at::R);
   Q.middleCols<3>(at::R) = (Q.middleCols<3>(at::R) * J_inverse.transpose()).eval();
+  Q.triangularView<Eigen::StrictlyUpper>() = Q.transpose();
   return Q;
 }
 
@@ -47,35 +48,32 @@ inline Covariance seen_at_iterate(const Covariance& P, const Eigen::Vector3d& tu
 template <class Model>
 Update update(const Estimate& prior, Model&& model, const UpdateConfig& config) {
   Update out;
-  out.posterior = prior;
+  out.posterior.t = prior.t;
   State x = prior.x;
   ErrorVector e = ErrorVector::Zero();  // x [-] prior.x; J^-1 e = e, since Jr(e_R) e_R = e_R
+  Covariance seen;
+  Eigen::Vector3d turned;
+  Gain<most_rows_of<Model>> gain;
   for (int k = 1; k <= config.max_iterations; ++k) {
     const auto measured = model(static_cast<const State&>(x), prior.P);
     const auto& rows = as_rows(measured);
     const auto count = rows.r.size();
     if (count == 0) return {prior, k, false, 0};
 
-    const Covariance P = seen_at_iterate(prior.P, e.segment<3>(at::R));
-    // S = L L', W = P H' L^-T: the gain is W L^-1 and P - W W' is symmetric by construction.
-    auto W = (P * rows.H.transpose()).eval();
-    auto S = (rows.H * W + rows.R).eval();
-    const auto llt = S.llt();
-    if (llt.info() != Eigen::Success) return {prior, k, false, 0};
-    llt.matrixU().template solveInPlace<Eigen::OnTheRight>(W);
-    auto innovation = (rows.r - rows.H * e).eval();
-    llt.matrixL().solveInPlace(innovation);
-    const ErrorVector d = -e - W * innovation;
+    turned = e.segment<3>(at::R);
+    const Covariance& P = turned.isZero(0) ? prior.P : (seen = seen_at_iterate(prior.P, turned));
+    gain.project(P, rows);
+    if (!gain.factor()) return {prior, k, false, 0};
+    const ErrorVector d = gain.step(rows, e);
 
     x = boxplus(x, d);
     e = boxminus(x, prior.x);
     out.iterations = k;
     out.rows = static_cast<int>(count);
-    out.converged = k >= config.min_iterations && d.segment<3>(at::R).norm() < config.rotation_step && d.segment<3>(at::p).norm() < config.position_step;
+    out.converged = k >= config.min_iterations && d.segment<3>(at::R).norm() < config.rotation_step &&
+                    d.segment<3>(at::p).norm() < config.position_step;
     if (out.converged || k == config.max_iterations) {
-      out.posterior.P = P;
-      out.posterior.P.template selfadjointView<Eigen::Lower>().rankUpdate(W, -1.0);
-      out.posterior.P.template triangularView<Eigen::StrictlyUpper>() = out.posterior.P.transpose();
+      gain.reduce(P, out.posterior.P);
       break;
     }
   }

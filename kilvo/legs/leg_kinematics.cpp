@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <console_bridge/console.h>
-#include <kdl/chainfksolvervel_recursive.hpp>
 #include <kdl/tree.hpp>
 #include <limits>
 #include <optional>
@@ -21,13 +20,7 @@ KDL::Frame to_kdl(const urdf::Pose& p) {
   return {KDL::Rotation::Quaternion(p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w), to_kdl(p.position)};
 }
 Eigen::Vector3d to_eigen(const KDL::Vector& v) { return {v.x(), v.y(), v.z()}; }
-Eigen::Matrix3d to_eigen(const KDL::Rotation& R) {
-  Eigen::Matrix3d M;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) M(i, j) = R(i, j);
-  }
-  return M;
-}
+Eigen::Matrix3d to_eigen(const KDL::Rotation& R) { return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(R.data); }
 
 KDL::Joint to_kdl(const urdf::Joint& joint, bool locked) {
   const KDL::Frame origin = to_kdl(joint.parent_to_joint_origin_transform);
@@ -77,12 +70,17 @@ KDL::Tree tree_of(const Robot& robot) {
 
 std::string missing(const std::string& joint) { return "joint " + joint + " is neither in the message nor in robot.locked_joints"; }
 
-// One leg: the solver with its input, and where in the message each joint is.
+// A joint and the rigid parts before it, in the frame of the joint before; R: how the frame behind it is turned when it is at zero.
+struct Joint {
+  bool turns = false, slides = false;  // neither: the rigid end of the leg
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero(), p = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+};
+
+// One leg: its joints from the IMU to the foot, and where in the message each of them is.
 struct Leg {
-  KDL::Chain chain;
-  std::unique_ptr<KDL::ChainFkSolverVel_recursive> solver;  // refers to the chain: made when the leg is where it stays
-  KDL::JntArrayVel joints;
-  std::vector<std::string> names;   // of the moving joints, from the IMU to the foot
+  std::vector<Joint> joints;        // the moving ones and the end
+  std::vector<std::string> names;   // of the moving ones
   std::vector<std::size_t> places;  // in the message, by joint
 };
 
@@ -91,13 +89,50 @@ Leg leg_of(const KDL::Tree& tree, const std::string& imu_link, const Foot& foot)
   for (const std::string& link : {imu_link, foot.link}) {
     if (tree.getSegment(link) == tree.getSegments().end()) throw std::invalid_argument("robot.urdf has no link " + link);
   }
-  if (!tree.getChain(imu_link, foot.link, leg.chain))
+  KDL::Chain chain;
+  if (!tree.getChain(imu_link, foot.link, chain))
     throw std::invalid_argument("robot.urdf: no way from link " + imu_link + " to link " + foot.link);
-  for (const KDL::Segment& s : leg.chain.segments) {
-    if (s.getJoint().getType() != KDL::Joint::Fixed) leg.names.push_back(s.getJoint().getName());
+  Joint next;
+  for (const KDL::Segment& s : chain.segments) {
+    const KDL::Frame at_zero = s.pose(0);
+    const KDL::Joint& joint = s.getJoint();
+    next.turns = joint.getType() == KDL::Joint::RotAxis;
+    next.slides = joint.getType() == KDL::Joint::TransAxis;
+    const bool moves = next.turns || next.slides;
+    // Against the tree's direction a joint is not where its segment ends: the rest of the way belongs to the next joint.
+    const Eigen::Vector3d end = to_eigen(at_zero.p), origin = moves ? to_eigen(joint.JointOrigin()) : end;
+    const Eigen::Matrix3d turned = to_eigen(at_zero.M);
+    next.p += next.R * origin;
+    next.axis = next.R * to_eigen(joint.JointAxis());
+    next.R = (next.R * turned).eval();
+    if (!moves) continue;
+    leg.names.push_back(joint.getName());
+    leg.joints.push_back(next);
+    next = Joint{};
+    next.p = turned.transpose() * (end - origin);
   }
-  leg.joints.resize(leg.chain.getNrOfJoints());
+  leg.joints.push_back(next);
   return leg;
+}
+
+// A frame that moves, as its base sees it.
+struct Moving {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p = Eigen::Vector3d::Zero(), v = Eigen::Vector3d::Zero(), omega = Eigen::Vector3d::Zero();
+};
+
+// From the frame behind one joint to that behind the next.
+void pass(const Joint& joint, double q, double dq, Moving& frame) {
+  const Eigen::Vector3d arm = frame.R * joint.p;
+  frame.p += arm;
+  frame.v += frame.omega.cross(arm);
+  const Eigen::Vector3d axis = frame.R * joint.axis;
+  if (joint.slides) {
+    frame.p += q * axis;
+    frame.v += frame.omega.cross(q * axis) + dq * axis;
+  }
+  if (joint.turns) frame.omega += dq * axis;
+  frame.R = (frame.R * (joint.turns ? Eigen::Matrix3d(SO3::Exp(q * joint.axis).matrix() * joint.R) : joint.R)).eval();
 }
 
 }  // namespace
@@ -171,21 +206,17 @@ FootPose LegKinematics::Chains::pose_of(std::size_t side, const JointSample& s, 
     out.v[0] = mount.T_imu_feet.R * triple(velocity_of_all);
     return out;
   }
-  Leg& leg = legs[side];
-  for (std::size_t i = 0; i < leg.places.size(); ++i) {
-    leg.joints.q(static_cast<unsigned>(i)) = s.position[leg.places[i]];
-    leg.joints.qdot(static_cast<unsigned>(i)) = velocity_of_all[leg.places[i]];
-  }
-  KDL::FrameVel frame;
-  leg.solver->JntToCart(leg.joints, frame);
-  const SE3 T_LF{SO3::nearest(to_eigen(frame.M.R)), to_eigen(frame.p.p)};
-  const Eigen::Vector3d omega = to_eigen(frame.M.w), v = to_eigen(frame.p.v);
+  const Leg& leg = legs[side];
+  Moving foot;
+  for (std::size_t i = 0; i < leg.places.size(); ++i) pass(leg.joints[i], s.position[leg.places[i]], velocity_of_all[leg.places[i]], foot);
+  pass(leg.joints.back(), 0, 0, foot);
+  const SE3 T_LF{SO3::nearest(foot.R), foot.p};
   out.R_IF = T_IL.R * T_LF.R;
   out.corners = static_cast<int>(feet[side].sole.size());
   for (std::size_t i = 0; i < feet[side].sole.size(); ++i) {
     const Eigen::Vector3d arm = T_LF.R * feet[side].sole[i];
     out.p[i] = T_IL * (T_LF.p + arm);
-    out.v[i] = T_IL.R * (v + omega.cross(arm));
+    out.v[i] = T_IL.R * (foot.v + foot.omega.cross(arm));
   }
   return out;
 }
@@ -204,7 +235,6 @@ LegKinematics::LegKinematics(const Robot& robot) : chains_(std::make_unique<Chai
     if (foot.sole.empty() || foot.sole.size() > max_corners)
       throw std::invalid_argument("robot.feet: the sole of " + foot.name + " needs 1 to " + std::to_string(max_corners) + " points");
     c.legs[side] = leg_of(tree, robot.imu.link, foot);
-    c.legs[side].solver = std::make_unique<KDL::ChainFkSolverVel_recursive>(c.legs[side].chain);
   }
 }
 

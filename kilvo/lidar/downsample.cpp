@@ -28,21 +28,24 @@ PointCluster cluster_of(const Cell& c) {
   return out;
 }
 
-// A hash table for one sweep: half full at most, 32-bit slots.
+// A hash table for one sweep: half full at most, 32-bit slots; no larger than the cells need, so that it stays in the inner caches.
 class CellTable {
  public:
   explicit CellTable(std::size_t points) {
-    std::size_t capacity = 1024;
-    while (capacity < 2 * points) capacity *= 2;
-    slots_.assign(capacity, empty);
-    mask_ = capacity - 1;
+    slots_.assign(4096, empty);
+    mask_ = slots_.size() - 1;
+    cells_.reserve(points / 2);
   }
+
+  void prefetch(VoxelKey key) const { __builtin_prefetch(&slots_[home(key)]); }
 
   Cell& cell_of(VoxelKey key, const Eigen::Vector3f& p) {
     for (std::size_t i = home(key);; i = (i + 1) & mask_) {
       if (slots_[i] == empty) {
         slots_[i] = static_cast<std::uint32_t>(cells_.size());
-        return cells_.emplace_back(Cell{key, p, Eigen::Vector3f::Zero(), 0, Eigen::Matrix<float, 6, 1>::Zero()});
+        cells_.emplace_back(Cell{key, p, Eigen::Vector3f::Zero(), 0, Eigen::Matrix<float, 6, 1>::Zero()});
+        if (2 * cells_.size() > slots_.size()) grow();
+        return cells_.back();
       }
       if (cells_[slots_[i]].key == key) return cells_[slots_[i]];
     }
@@ -61,15 +64,27 @@ class CellTable {
  private:
   static constexpr std::uint32_t empty = 0xffffffff;
   std::size_t home(VoxelKey key) const { return (key * 0x9E3779B97F4A7C15ULL) >> 32 & mask_; }
+  void grow() {
+    slots_.assign(2 * slots_.size(), empty);
+    mask_ = slots_.size() - 1;
+    for (std::uint32_t k = 0; k < cells_.size(); ++k) {
+      std::size_t i = home(cells_[k].key);
+      while (slots_[i] != empty) i = (i + 1) & mask_;
+      slots_[i] = k;
+    }
+  }
 
   std::vector<std::uint32_t> slots_;
   std::vector<Cell> cells_;
   std::size_t mask_;
 };
 
-// In cells, in the world.
-Eigen::Vector3d mean_of(const Cell& c, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
-  return R * (c.first + c.sum / c.count).cast<double>() + t;
+// The mean of each cell, in cells, in the world.
+std::vector<Eigen::Vector3d> means_of(const std::vector<Cell>& cells, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
+  std::vector<Eigen::Vector3d> means;
+  means.reserve(cells.size());
+  for (const Cell& c : cells) means.emplace_back(R * (c.first + c.sum / c.count).cast<double>() + t);
+  return means;
 }
 
 // Of each cell the index of the cell that its points belong to: itself, or the fuller neighbour across a face, where both their means are
@@ -77,10 +92,11 @@ Eigen::Vector3d mean_of(const Cell& c, const Eigen::Matrix3d& R, const Eigen::Ve
 // their own, far off the surface, and those that stayed would lean the other way.
 std::vector<std::uint32_t> owners_of(const CellTable& table, const Eigen::Matrix3d& R, const Eigen::Vector3d& t, double reach) {
   const std::vector<Cell>& cells = table.cells();
+  const std::vector<Eigen::Vector3d> means = means_of(cells, R, t);
   std::vector<std::uint32_t> owner(cells.size());
   for (std::uint32_t i = 0; i < cells.size(); ++i) {
     owner[i] = i;
-    const Eigen::Vector3d w = mean_of(cells[i], R, t);
+    const Eigen::Vector3d& w = means[i];
     const std::array<std::int64_t, 3> at = {fast_floor(w.x()), fast_floor(w.y()), fast_floor(w.z())};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const int k = static_cast<int>(axis);
@@ -92,7 +108,7 @@ std::vector<std::uint32_t> owners_of(const CellTable& table, const Eigen::Matrix
       const auto other = table.find(pack_key(beside[0], beside[1], beside[2]));
       if (!other) continue;
       const double face = static_cast<double>(side > 0 ? at[axis] + 1 : at[axis]);
-      if (std::abs(mean_of(cells[*other], R, t)[k] - face) > reach) continue;
+      if (std::abs(means[*other][k] - face) > reach) continue;
       const float best = cells[owner[i]].count;
       // Fuller, or first among equals: no two own each other.
       if (cells[*other].count > best || (cells[*other].count == best && *other < owner[i])) owner[i] = *other;
@@ -115,25 +131,35 @@ void join(const Cell& from, Cell& to) {
   to.count += from.count;
 }
 
+void add(const Eigen::Vector3f& p, Cell& c) {
+  const Eigen::Vector3f d = p - c.first;
+  c.count += 1;
+  c.sum += d;
+  c.outer[0] += d.x() * d.x();
+  c.outer[1] += d.x() * d.y();
+  c.outer[2] += d.x() * d.z();
+  c.outer[3] += d.y() * d.y();
+  c.outer[4] += d.y() * d.z();
+  c.outer[5] += d.z() * d.z();
+}
+
 }  // namespace
 
 std::vector<PointCluster> downsample(std::span<const PointXYZI> points, const SE3& T_WI, double cell, double reach) {
   CellTable table(points.size());
   const Eigen::Matrix3d R = T_WI.R.matrix() / cell;
   const Eigen::Vector3d t = T_WI.p / cell;
-  for (const PointXYZI& point : points) {
-    const Eigen::Vector3f p = point.head<3>();
-    const Eigen::Vector3d w = R * p.cast<double>() + t;
-    Cell& c = table.cell_of(pack_key(fast_floor(w.x()), fast_floor(w.y()), fast_floor(w.z())), p);
-    const Eigen::Vector3f d = p - c.first;
-    c.count += 1;
-    c.sum += d;
-    c.outer[0] += d.x() * d.x();
-    c.outer[1] += d.x() * d.y();
-    c.outer[2] += d.x() * d.z();
-    c.outer[3] += d.y() * d.y();
-    c.outer[4] += d.y() * d.z();
-    c.outer[5] += d.z() * d.z();
+  // So many points wait for the table at once.
+  constexpr std::size_t together = 32;
+  std::array<VoxelKey, together> keys;
+  for (std::size_t first = 0; first < points.size(); first += together) {
+    const auto next = points.subspan(first, std::min(together, points.size() - first));
+    for (std::size_t i = 0; i < next.size(); ++i) {
+      const Eigen::Vector3d w = R * next[i].head<3>().cast<double>() + t;
+      keys[i] = pack_key(fast_floor(w.x()), fast_floor(w.y()), fast_floor(w.z()));
+      table.prefetch(keys[i]);
+    }
+    for (std::size_t i = 0; i < next.size(); ++i) add(next[i].head<3>(), table.cell_of(keys[i], next[i].head<3>()));
   }
   std::vector<Cell>& cells = table.cells();
   const std::vector<std::uint32_t> owner = owners_of(table, R, t, std::min(reach / cell, 0.25));

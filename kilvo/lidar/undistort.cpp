@@ -6,15 +6,15 @@
 namespace kilvo {
 namespace {
 
-using Affine = Eigen::Matrix<float, 3, 4>;
+using Affine = Eigen::Matrix4f;  // whole columns, of which the processor takes four numbers at once
 
 // Poses every millisecond; between them the matrix is interpolated, which at 10 rad/s is wrong by 1e-5 rad at most.
 constexpr std::int64_t step_ns = 1'000'000;
 
 Affine to_affine(const SE3& T) {
-  Affine A;
-  A.leftCols<3>() = T.R.matrix().cast<float>();
-  A.col(3) = T.p.cast<float>();
+  Affine A = Affine::Zero();
+  A.topLeftCorner<3, 3>() = T.R.matrix().cast<float>();
+  A.topRightCorner<3, 1>() = T.p.cast<float>();
   return A;
 }
 
@@ -81,10 +81,10 @@ std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajec
     const float s = static_cast<float>(offset - i * step_ns) * inverse_step;
     const Affine& A = poses[static_cast<std::size_t>(i)];
     const Affine& B = poses[static_cast<std::size_t>(i) + 1];
-    const Eigen::Vector3f a = A.col(0) * p.x + A.col(1) * p.y + A.col(2) * p.z + A.col(3);
-    const Eigen::Vector3f b = B.col(0) * p.x + B.col(1) * p.y + B.col(2) * p.z + B.col(3);
-    const Eigen::Vector3f x = a + s * (b - a);
-    out.emplace_back(x.x(), x.y(), x.z(), p.intensity);
+    const Eigen::Vector4f a = A.col(0) * p.x + A.col(1) * p.y + A.col(2) * p.z + A.col(3);
+    const Eigen::Vector4f b = B.col(0) * p.x + B.col(1) * p.y + B.col(2) * p.z + B.col(3);
+    PointXYZI& x = out.emplace_back(a + s * (b - a));
+    x[3] = p.intensity;
   }
   return out;
 }

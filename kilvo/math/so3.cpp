@@ -1,5 +1,6 @@
 #include "kilvo/math/so3.hpp"
 
+#include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
@@ -14,6 +15,11 @@ constexpr double small_angle_squared = 1e-6;
 }  // namespace
 
 SO3 SO3::nearest(const Eigen::Matrix3d& m) {
+  // Within rounding already: one Newton step of the polar decomposition squares what is left, and takes a tenth of the time.
+  constexpr double close = 1e-7;
+  const Eigen::Matrix3d square = m.transpose() * m;
+  if ((square - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < close && m.determinant() > 0)
+    return SO3(Eigen::Matrix3d(m * (1.5 * Eigen::Matrix3d::Identity() - 0.5 * square)));
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1.0 : 1.0;
   return SO3(svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose());

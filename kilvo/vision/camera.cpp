@@ -94,7 +94,13 @@ double undistorted(const std::array<double, 5>& k, bool fisheye, double wanted, 
   return r;
 }
 
-/// Where a point of the plane z = 1 seems to lie, and the derivative by it.
+/// Where a point of the plane z = 1 seems to lie.
+Eigen::Vector2d radtan_at(const std::array<double, 5>& k, double x, double y) {
+  const double xx = x * x, yy = y * y, xy = x * y, s = xx + yy, scale = 1 + s * (k[0] + s * (k[1] + s * k[4]));
+  return {x * scale + 2 * k[2] * xy + k[3] * (s + 2 * xx), y * scale + k[2] * (s + 2 * yy) + 2 * k[3] * xy};
+}
+
+/// The same, and the derivative by it.
 struct Distorted {
   Eigen::Vector2d at;
   Eigen::Matrix2d J;
@@ -104,7 +110,7 @@ Distorted radtan(const std::array<double, 5>& k, const Eigen::Vector2d& m) {
   const double scale = 1 + s * (k[0] + s * (k[1] + s * k[4])), slope = 2 * (k[0] + s * (2 * k[1] + s * 3 * k[4]));  // d scale / d s * 2
   const double p1 = k[2], p2 = k[3];
   Distorted out;
-  out.at = {x * scale + 2 * p1 * xy + p2 * (s + 2 * xx), y * scale + p1 * (s + 2 * yy) + 2 * p2 * xy};
+  out.at = radtan_at(k, x, y);
   const double across = xy * slope + 2 * (p1 * x + p2 * y);
   out.J << scale + xx * slope + 2 * p1 * y + 6 * p2 * x, across, across, scale + yy * slope + 6 * p1 * y + 2 * p2 * x;
   return out;
@@ -128,9 +134,18 @@ Camera::Camera(const CameraMount& mount)
 }
 
 std::optional<Eigen::Vector2d> Camera::project(const Eigen::Vector3d& p_C) const {
-  const auto seen = project_with_jacobian(p_C);
-  if (!seen) return std::nullopt;
-  return seen->pixel;
+  const double x = p_C.x(), y = p_C.y(), z = p_C.z();
+  if (!(z > 0)) return std::nullopt;
+  const double rho = std::sqrt(x * x + y * y);
+  const Eigen::Vector2d focal(fx_, fy_), middle(cx_, cy_);
+  if (!fisheye_) {
+    if (!(rho <= largest_ * z)) return std::nullopt;
+    return focal.cwiseProduct(radtan_at(k_, x / z, y / z)) + middle;
+  }
+  const double angle = std::atan2(rho, z);
+  if (!(angle <= largest_)) return std::nullopt;
+  const double scale = rho < 1e-8 * z ? 1 / z : radial(k_, true, angle).value / rho;
+  return Eigen::Vector2d(fx_ * scale * x + cx_, fy_ * scale * y + cy_);
 }
 
 std::optional<Camera::Projection> Camera::project_with_jacobian(const Eigen::Vector3d& p_C) const {

@@ -1,6 +1,7 @@
 #include "kilvo/vision/depth_view.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace kilvo {
 namespace {
@@ -32,7 +33,8 @@ Window window_of(const Camera& camera) {
   constexpr int steps = 16;
   for (int k = 0; k <= steps; ++k) {
     const double s = static_cast<double>(k) / steps;
-    for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(s * w, 0), Eigen::Vector2d(s * w, h), Eigen::Vector2d(0, s * h), Eigen::Vector2d(w, s * h)}) {
+    for (const Eigen::Vector2d& pixel :
+         {Eigen::Vector2d(s * w, 0), Eigen::Vector2d(s * w, h), Eigen::Vector2d(0, s * h), Eigen::Vector2d(w, s * h)}) {
       const auto ray = camera.unproject(pixel);
       constexpr float all = 1e6F;  // it sees up to a limit of its own: project() decides
       if (!ray) return {-all, all, -all, all};
@@ -62,6 +64,26 @@ DepthView::DepthView(const Camera& camera, const SE3& T_CW, std::span<const Eige
     if (nearest == none || p_C.z() < seen_[nearest].depth) nearest = static_cast<std::uint32_t>(seen_.size());
     seen_.push_back({i, pixel->cast<float>(), p_C.z()});
   }
+  find_fronts();
+}
+
+void DepthView::find_fronts() {
+  constexpr float nothing = std::numeric_limits<float>::infinity();
+  const auto columns = static_cast<std::size_t>(columns_), rows = static_cast<std::size_t>(rows_);
+  const std::size_t wide = columns + 2;  // with a border
+  std::vector<float> own(wide * (rows + 2), nothing), across(own);
+  for (std::size_t y = 0; y < rows; ++y) {
+    for (std::size_t x = 0; x < columns; ++x) {
+      const std::uint32_t nearest = nearest_[y * columns + x];
+      if (nearest != none) own[(y + 1) * wide + x + 1] = seen_[nearest].depth;
+    }
+  }
+  for (std::size_t i = 1; i + 1 < own.size(); ++i) across[i] = std::min(own[i], std::min(own[i - 1], own[i + 1]));
+  fronts_.resize(columns * rows);
+  for (std::size_t y = 0; y < rows; ++y) {
+    const float* here = across.data() + (y + 1) * wide + 1;
+    for (std::size_t x = 0; x < columns; ++x) fronts_[y * columns + x] = std::min(here[x], std::min(here[x - wide], here[x + wide]));
+  }
 }
 
 template <class F>
@@ -77,6 +99,7 @@ bool DepthView::any_around(const Eigen::Vector2d& pixel, F&& f) const {
 }
 
 bool DepthView::hides(const Eigen::Vector2d& pixel, const Eigen::Vector3d& p_W, const Eigen::Vector3d& n_W, double depth) const {
+  if (static_cast<double>(front(pixel.cast<float>())) >= depth) return false;
   const double limit = in_front_least + in_front_share * depth;
   return any_around(pixel, [&](const Seen& s) { return static_cast<double>(s.depth) < depth && n_W.dot(point(s) - p_W) > limit; });
 }
@@ -84,7 +107,7 @@ bool DepthView::hides(const Eigen::Vector2d& pixel, const Eigen::Vector3d& p_W, 
 bool DepthView::shows(const Seen& s) const {
   constexpr float share = 0.1F;
   const float limit = s.depth * (1 - share) - static_cast<float>(in_front_least);
-  return !any_around(s.pixel.cast<double>(), [limit](const Seen& other) { return other.depth < limit; });
+  return front(s.pixel) >= limit;
 }
 
 }  // namespace kilvo

@@ -37,11 +37,16 @@ class DepthView {
   static constexpr std::uint32_t none = 0xffffffff;
   template <class F>
   bool any_around(const Eigen::Vector2d& pixel, F&& f) const;
+  void find_fronts();
+  float front(const Eigen::Vector2f& pixel) const {
+    return fronts_[static_cast<std::size_t>(static_cast<int>(pixel.y()) / cell * columns_ + static_cast<int>(pixel.x()) / cell)];
+  }
 
   std::span<const Eigen::Vector4f> points_W_;
   std::vector<Seen> seen_;
   int columns_, rows_;
   std::vector<std::uint32_t> nearest_;  // by cell: of seen_
+  std::vector<float> fronts_;           // by cell: the least depth in it and around it
 };
 
 }  // namespace kilvo

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kilvo/math/wide.hpp"
+
 namespace kilvo {
 namespace {
 
@@ -12,7 +14,7 @@ constexpr double largest_scale = 1.5, smallest_scale = 0.55;
 constexpr float half = (Template::size - 1) / 2.0F;
 
 struct Corner {
-  int x, y;              // upper left pixel of a patch in its level
+  int x, y;                // upper left pixel of a patch in its level
   Eigen::Vector2d centre;  // of the point within the patch
 };
 
@@ -74,7 +76,8 @@ std::optional<Template> warp(const Observation& from, const Eigen::Matrix2d& A, 
   std::array<float, wide * wide> values;
   for (int j = 0; j < wide; ++j) {
     Eigen::Vector2f at = centre - reach * step.col(0) + (static_cast<float>(j) - reach) * step.col(1);
-    for (int i = 0; i < wide; ++i, at += step.col(0)) values[static_cast<std::size_t>(j * wide + i)] = sample(pixels.data(), Patch::size, at.x(), at.y());
+    for (int i = 0; i < wide; ++i, at += step.col(0))
+      values[static_cast<std::size_t>(j * wide + i)] = sample(pixels.data(), Patch::size, at.x(), at.y());
   }
   Template out;
   for (int j = 0; j < Template::size; ++j) {
@@ -89,7 +92,7 @@ std::optional<Template> warp(const Observation& from, const Eigen::Matrix2d& A, 
   return out;
 }
 
-void sample_patch(const GreyImage& image, const Eigen::Vector2f& centre, std::array<float, Template::count>& out) {
+KILVO_WIDE void sample_patch(const GreyImage& image, const Eigen::Vector2f& centre, std::array<float, Template::count>& out) {
   const float x0 = centre.x() - half, y0 = centre.y() - half;
   const int ix = static_cast<int>(x0), iy = static_cast<int>(y0);
   const float a = x0 - static_cast<float>(ix), b = y0 - static_cast<float>(iy);
@@ -105,15 +108,19 @@ void sample_patch(const GreyImage& image, const Eigen::Vector2f& centre, std::ar
   }
 }
 
-float correlation(const std::array<float, Template::count>& a, const std::array<float, Template::count>& b) {
-  float sa = 0, sb = 0, saa = 0, sab = 0, sbb = 0;
-  for (std::size_t k = 0; k < Template::count; ++k) {
-    sa += a[k];
-    sb += b[k];
-    saa += a[k] * a[k];
-    sab += a[k] * b[k];
-    sbb += b[k] * b[k];
+KILVO_WIDE float correlation(const std::array<float, Template::count>& a, const std::array<float, Template::count>& b) {
+  Lanes sum_a{}, sum_b{}, sum_aa{}, sum_ab{}, sum_bb{};
+  for (std::size_t k = 0; k < Template::count; k += lanes) {
+    Lanes x, y;
+    read_lanes(x, &a[k]);
+    read_lanes(y, &b[k]);
+    sum_a += x;
+    sum_b += y;
+    sum_aa += x * x;
+    sum_ab += x * y;
+    sum_bb += y * y;
   }
+  const float sa = total(sum_a), sb = total(sum_b), saa = total(sum_aa), sab = total(sum_ab), sbb = total(sum_bb);
   constexpr float n = Template::count;
   const float va = saa - sa * sa / n, vb = sbb - sb * sb / n;
   constexpr float flat = 1e-3F;

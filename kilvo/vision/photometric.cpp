@@ -6,6 +6,7 @@
 #include <map>
 
 #include "kilvo/filter/pose_error.hpp"
+#include "kilvo/math/wide.hpp"
 
 namespace kilvo {
 namespace {
@@ -21,14 +22,22 @@ constexpr double reach = 0.7;
 
 using Values = std::array<float, Template::count>;
 
-PatchSums sums_of(const Template& patch, const Values& image, double tau, double tau_patch, double bias_variance, double variance) {
-  const auto t = static_cast<float>(tau), tp = static_cast<float>(tau_patch);
-  // The gradient is the patch's, so that it stays the same from iterate to iterate. The exposure is known by the patch's mean alone: by its
-  // contrast, noise that is in the patch and in r would make each generation of patches look a little darker than the last.
-  float xx = 0, xy = 0, yy = 0, sx = 0, sy = 0, xr = 0, yr = 0, sr = 0, rr = 0, sum = 0, top = 0;
-  for (std::size_t k = 0; k < Template::count; ++k) {
-    const float x = tp * patch.dx[k], y = tp * patch.dy[k];
-    const float r = t * image[k] - tp * patch.value[k];
+struct Sums {
+  float xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top;
+};
+
+// Over the pixels, in lanes that are added at the end.
+KILVO_WIDE Sums sum_up(const Template& patch, const Values& image, float t, float tp) {
+  Lanes xx{}, xy{}, yy{}, sx{}, sy{}, xr{}, yr{}, sr{}, rr{}, sum{}, top{};
+  for (std::size_t k = 0; k < Template::count; k += lanes) {
+    Lanes value, seen, x, y;
+    read_lanes(value, &patch.value[k]);
+    read_lanes(seen, &image[k]);
+    read_lanes(x, &patch.dx[k]);
+    read_lanes(y, &patch.dy[k]);
+    x *= tp;
+    y *= tp;
+    const Lanes r = t * seen - tp * value;
     xx += x * x;
     xy += x * y;
     yy += y * y;
@@ -38,9 +47,21 @@ PatchSums sums_of(const Template& patch, const Values& image, double tau, double
     yr += y * r;
     sr += r;
     rr += r * r;
-    sum += patch.value[k];
-    top = std::max(top, std::max(image[k], patch.value[k]));
+    sum += value;
+    const Lanes brighter = value > seen ? value : seen;
+    top = brighter > top ? brighter : top;
   }
+  float most = 0;
+  for (std::size_t i = 0; i < lanes; ++i) most = std::max(most, top[i]);
+  return {total(xx), total(xy), total(yy), total(sx), total(sy), total(xr), total(yr), total(sr), total(rr), total(sum), most};
+}
+
+PatchSums sums_of(const Template& patch, const Values& image, double tau, double tau_patch, double bias_variance, double variance) {
+  const auto t = static_cast<float>(tau), tp = static_cast<float>(tau_patch);
+  // The gradient is the patch's, so that it stays the same from iterate to iterate. The exposure is known by the patch's mean alone: by its
+  // contrast, noise that is in the patch and in r would make each generation of patches look a little darker than the last.
+  const Sums sums = sum_up(patch, image, t, tp);
+  const auto& [xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top] = sums;
   constexpr double n = Template::count;
   PatchSums out;
   out.saturated = top > bright;
@@ -57,9 +78,13 @@ PatchSums sums_of(const Template& patch, const Values& image, double tau, double
 }
 
 float mean_of(const Values& values) {
-  float sum = 0;
-  for (const float v : values) sum += v;
-  return sum / Template::count;
+  Lanes sum{};
+  for (std::size_t k = 0; k < Template::count; k += lanes) {
+    Lanes v;
+    read_lanes(v, &values[k]);
+    sum += v;
+  }
+  return total(sum) / Template::count;
 }
 
 double median_of(std::vector<double>& values) {
@@ -165,7 +190,8 @@ PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x)
   return out;
 }
 
-std::optional<PhotometricModel::Found> PhotometricModel::find(const Eigen::Matrix3d& M, const Eigen::Vector3d& b, const Eigen::Matrix2d& shift) {
+std::optional<PhotometricModel::Found> PhotometricModel::find(const Eigen::Matrix3d& M, const Eigen::Vector3d& b,
+                                                              const Eigen::Matrix2d& shift) {
   if (!(M(2, 2) > 0)) return std::nullopt;
   const Eigen::Matrix2d A = M.topLeftCorner<2, 2>() - M.topRightCorner<2, 1>() * M.bottomLeftCorner<1, 2>() / M(2, 2);
   if (!(A.determinant() > 0)) return std::nullopt;

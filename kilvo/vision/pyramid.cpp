@@ -3,19 +3,29 @@
 #include <algorithm>
 #include <utility>
 
+#include "kilvo/math/wide.hpp"
+
 namespace kilvo {
 namespace {
 
 constexpr int smallest_side = 16;  // px
 
+/// Grey from colours, 0.299 0.587 0.114.
+KILVO_WIDE void mix(const std::uint8_t* __restrict in, std::uint8_t* __restrict grey, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto sum = static_cast<std::uint16_t>(77U * in[3 * i] + 150U * in[3 * i + 1] + 29U * in[3 * i + 2] + 128U);
+    grey[i] = static_cast<std::uint8_t>(sum >> 8);
+  }
+}
+
 /// A row between four, of weights 1 3 3 1: up to 8 * 255.
-void blend_rows(const std::uint8_t* __restrict a, const std::uint8_t* __restrict b, const std::uint8_t* __restrict c,
-                const std::uint8_t* __restrict d, std::uint16_t* __restrict out, int width) {
+KILVO_WIDE void blend_rows(const std::uint8_t* __restrict a, const std::uint8_t* __restrict b, const std::uint8_t* __restrict c,
+                           const std::uint8_t* __restrict d, std::uint16_t* __restrict out, int width) {
   for (int x = 0; x < width; ++x) out[x] = static_cast<std::uint16_t>(a[x] + d[x] + 3 * (b[x] + c[x]));
 }
 
 /// Every second column between four, of weights 1 3 3 1 and rounded; `in` begins one pixel before the row.
-void blend_columns(const std::uint16_t* __restrict in, std::uint8_t* __restrict out, int half_width) {
+KILVO_WIDE void blend_columns(const std::uint16_t* __restrict in, std::uint8_t* __restrict out, int half_width) {
   for (int x = 0; x < half_width; ++x) {
     const auto sum = static_cast<std::uint16_t>(in[2 * x] + in[2 * x + 3] + 3 * (in[2 * x + 1] + in[2 * x + 2]) + 32);
     out[x] = static_cast<std::uint8_t>(sum >> 6);
@@ -27,16 +37,7 @@ void blend_columns(const std::uint16_t* __restrict in, std::uint8_t* __restrict 
 GreyImage to_grey(const Image& image) {
   if (image.channels != 3) return {image.width, image.height, image.pixels};
   GreyImage out{image.width, image.height, std::vector<std::uint8_t>(image.pixels.size() / 3)};
-  const std::uint8_t* in = image.pixels.data();
-  std::uint8_t* __restrict grey = out.pixels.data();
-  const std::size_t count = out.pixels.size();
-  // 0.299 0.587 0.114
-  const auto mix = [](const std::uint8_t* p) { return static_cast<std::uint8_t>((77U * p[0] + 150U * p[1] + 29U * p[2] + 128U) >> 8); };
-  std::size_t i = 0;
-  for (; i + 8 <= count; i += 8, in += 24) {
-    for (std::size_t k = 0; k < 8; ++k) grey[i + k] = mix(in + 3 * k);
-  }
-  for (; i < count; ++i, in += 3) grey[i] = mix(in);
+  mix(image.pixels.data(), out.pixels.data(), out.pixels.size());
   return out;
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace kilvo {
@@ -17,8 +18,17 @@ constexpr double most_turned = 0.7;
 
 std::vector<VoxelKey> voxels_in_view(const VisualMap& map, const DepthView& depth) {
   std::vector<VoxelKey> keys;
-  keys.reserve(depth.seen().size());
-  for (const DepthView::Seen& s : depth.seen()) keys.push_back(map.key_of(depth.point(s)));
+  // Most points lie in a voxel that was met a moment ago: those need not be sorted.
+  constexpr std::size_t recent = 256;
+  std::array<VoxelKey, recent> met;
+  met.fill(~VoxelKey{0});
+  for (const DepthView::Seen& s : depth.seen()) {
+    const VoxelKey key = map.key_of(depth.point(s));
+    VoxelKey& last = met[(key * 0x9E3779B97F4A7C15ULL >> 32) % recent];
+    if (last == key) continue;
+    last = key;
+    keys.push_back(key);
+  }
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   return keys;
@@ -45,7 +55,8 @@ bool choose_observation(const View& view, const VisualPoint& p, Track& track) {
     const double angle = std::acos(std::clamp(from.dot(towards) / (reference * distance), -1.0, 1.0));
     if (angle > most_turned) continue;
     const double octaves = std::abs(std::log2(reference / distance));
-    const double unlike = std::max(0.0, octaves - alike_scale) + std::max(0.0, angle - alike_angle) + 2 * (1 - static_cast<double>(o.agreement));
+    const double unlike =
+        std::max(0.0, octaves - alike_scale) + std::max(0.0, angle - alike_angle) + 2 * (1 - static_cast<double>(o.agreement));
     if (unlike >= best) continue;
     best = unlike;
     track.observation = p.observations[k];

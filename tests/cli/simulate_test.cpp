@@ -122,6 +122,32 @@ TEST(Simulate, AllThatIsRecordedIsUsedAndItsTimeCounted) {
   EXPECT_THAT(info.out, testing::Not(HasSubstr("not by this version")));
 }
 
+TEST(Simulate, AWalkGoesThroughTheLiveRunnerAsItWouldOnTheRobot) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(kilvo({"simulate", "room", "--out", folder / "sim", "--seed", "5", "--duration", "5"}).code, 0);
+  // Before INPUT, the speed left out; and slower than it was, so that a busy machine keeps up.
+  for (const std::vector<std::string>& pace : {std::vector<std::string>{"--realtime"}, {"--realtime", "0.8", "--delay", "camera:60"}}) {
+    std::vector<std::string> words = {"run"};
+    words.insert(words.end(), pace.begin(), pace.end());
+    for (const std::string& word : {folder / "sim", std::string("--out"), folder / "live"}) words.push_back(word);
+    const Finished f = kilvo(words);
+    ASSERT_EQ(f.code, 0) << f.err;
+    const auto summary = nlohmann::json::parse(read_text(folder / "live/summary.json"));
+    EXPECT_GT(summary["wall_seconds"], 4.5);
+    EXPECT_EQ(summary["latency_ms"]["n"], summary["outputs"]);
+    EXPECT_GT(summary["latency_ms"]["p50"], 0);
+    EXPECT_LE(summary["latency_ms"]["p50"], summary["latency_ms"]["p99_9"]);
+    EXPECT_GT(summary["correction_ms"]["n"], 20);
+    for (const char* key : {"deadline_misses", "queue_drops", "queue_depth"}) EXPECT_TRUE(summary.contains(key)) << key;
+    for (const char* thread : {"fast", "slow", "output"}) EXPECT_TRUE(summary["cpu_percent"].contains(thread)) << thread;
+    EXPECT_EQ(lines_in(folder / "live/odometry.tum"), summary["outputs"]);
+    EXPECT_EQ(lines_in(folder / "live/odometry_smooth.tum"), summary["outputs"]);
+    EXPECT_EQ(lines_in(folder / "live/sweeps.tum"), summary["sweeps"]);
+    EXPECT_GT(summary["sweeps"], 30);
+    lab::read_tum(folder / "live/odometry.tum");  // throws on time going back
+  }
+}
+
 TEST(Simulate, AWalkIsWrittenReadByOthersAndRunOn) {
   const Simulated walk;
   const Finished f = kilvo({"simulate", "room", "--out", walk.folder / "sim", "--seed", "3", "--duration", "5"});
