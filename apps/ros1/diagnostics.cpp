@@ -83,7 +83,7 @@ DiagnosticStatus status_of_estimate(const Condition& c) {
   }
   const EstimateState& e = *c.estimate;
   std::uint8_t level = lost.empty() ? DiagnosticStatus::OK : DiagnosticStatus::WARN;
-  if (e.modality == Modality::coast || c.seen.diverged) level = DiagnosticStatus::ERROR;
+  if (e.modality == Modality::coast || c.seen.diverged || trouble_of(Sensor::imu, c)) level = DiagnosticStatus::ERROR;
   std::string text = fmt::format("{} ({})", name_of(e.modality), e.cause);
   if (!lost.empty()) text += ", lost: " + lost;
   if (c.seen.diverged) text += ", diverged";

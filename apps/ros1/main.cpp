@@ -1,4 +1,5 @@
 // kilvo_node: KILVO for ROS 1.
+#include <charconv>
 #include <csignal>
 #include <ctime>
 #include <exception>
@@ -6,6 +7,9 @@
 #include <ros/init.h>
 #include <ros/master.h>
 #include <ros/node_handle.h>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "apps/ros1/node.hpp"
 
@@ -32,6 +36,50 @@ class StopSignals {
 
  private:
   sigset_t signals_{};
+};
+
+/// The command line, without the parameters on it: with these ros::init would wait for a master, deaf to signals.
+class CommandLine {
+ public:
+  CommandLine(int argc, char** argv) : words_(argv, argv + argc) {
+    std::erase_if(words_, [this](const char* word) {
+      const std::string_view text = word;
+      const std::size_t sign = text.find(":=");
+      const bool is_parameter = sign != text.npos && text.starts_with('_') && !text.starts_with("__");
+      if (is_parameter) parameters_.emplace_back(text.substr(1, sign - 1), text.substr(sign + 2));
+      return is_parameter;
+    });
+  }
+
+  /// Throws ParameterError when there is something that ROS does not understand either.
+  void init_ros() {
+    int argc = static_cast<int>(words_.size());
+    words_.push_back(nullptr);
+    ros::init(argc, words_.data(), "kilvo", ros::init_options::NoSigintHandler);
+    if (argc > 1)
+      throw ros1::ParameterError(
+          fmt::format("'{}' is not understood: parameters are given as _config:=FILE, or by a launch file", words_[1]));
+  }
+
+  /// As ros::init would have done it.
+  void set_parameters(const ros::NodeHandle& own) const {
+    for (const auto& [name, value] : parameters_) {
+      double number = 0;
+      const char* end = value.data() + value.size();
+      const auto [rest, error] = std::from_chars(value.data(), end, number);
+      if (value == "true" || value == "false") {
+        own.setParam(name, value == "true");
+      } else if (error == std::errc() && rest == end) {
+        own.setParam(name, number);
+      } else {
+        own.setParam(name, value);
+      }
+    }
+  }
+
+ private:
+  std::vector<char*> words_;
+  std::vector<std::pair<std::string, std::string>> parameters_;
 };
 
 // Without a master there are no parameters to read.
@@ -62,13 +110,11 @@ lab::Settings load(const ros1::Parameters& parameters) {
 
 int run(int argc, char** argv) {
   const StopSignals stop;
-  ros::init(argc, argv, "kilvo", ros::init_options::NoSigintHandler);
-  if (argc > 1) {
-    fmt::print(stderr, "kilvo_node: '{}' is not understood: parameters are given as _config:=FILE, or by a launch file\n", argv[1]);
-    return wrong_usage;
-  }
+  CommandLine words(argc, argv);
+  words.init_ros();
   if (!wait_for_master(stop)) return done;
   ros::NodeHandle node, own("~");
+  words.set_parameters(own);
   const ros1::Parameters parameters = ros1::read_parameters(own);
   {
     ros1::Node kilvo(parameters, load(parameters));
