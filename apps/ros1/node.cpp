@@ -45,6 +45,17 @@ std::unique_ptr<Node::Life> Node::begin_life() {
                                                                    [this](Output output) { map_.take(std::move(output)); }});
 }
 
+void Node::end_life() {
+  if (!life_) return;
+  life_->runner.stop();
+  const live::LiveStatistics& s = life_->runner.statistics();
+  ROS_INFO_STREAM(
+      "kilvo: " << fmt::format("sample to pose: p50 {:.3f} ms, p99 {:.3f} ms, p99.9 {:.3f} ms, {} samples; legs given up: {}, outputs: {}",
+                               1e3 * s.latency.quantile(0.5), 1e3 * s.latency.quantile(0.99), 1e3 * s.latency.quantile(0.999),
+                               s.latency.count(), s.dropped[static_cast<std::size_t>(Sensor::legs)], s.dropped_outputs));
+  life_.reset();
+}
+
 void Node::push(Measurement m) {
   if (const auto* joints = std::get_if<JointSample>(&m); joints != nullptr && !is_of_this_robot(*joints)) return;
   const std::shared_lock lock(life_mutex_);
@@ -99,7 +110,7 @@ void Node::stop() {
   services_.clear();
   inputs_->stop();
   const std::unique_lock lock(life_mutex_);
-  life_.reset();
+  end_life();
 }
 
 void Node::offer_services() {
@@ -140,7 +151,7 @@ bool Node::save_map(TriggerAnswer& answer) {
 
 bool Node::reset(TriggerAnswer& answer) {
   const std::unique_lock lock(life_mutex_);  // measurements wait in their queues
-  life_.reset();
+  end_life();
   states_.clear();
   map_.clear();
   life_ = begin_life();

@@ -41,6 +41,7 @@ class Node {
   };
 
   std::unique_ptr<Life> begin_life();
+  void end_life();
   void push(Measurement m);
   bool is_of_this_robot(const JointSample& sample);
   Condition condition();
