@@ -34,6 +34,9 @@ Node::Node(const Parameters& parameters, const lab::Settings& settings)
   diagnostics_ = ros::NodeHandle().advertise<DiagnosticsMessage>("/diagnostics", 10);
   inputs_ = std::make_unique<SensorInputs>(settings_, parameters_.no_deskew, [this](Measurement m) { push(std::move(m)); });
   offer_services();
+  std::vector<std::string> services;
+  for (const ros::ServiceServer& service : services_) services.push_back(service.getService());
+  master_.emplace(std::move(services));
 }
 
 Node::Life::Life(const lab::Settings& settings, live::LiveRunner::Sinks sinks)
@@ -90,6 +93,7 @@ Condition Node::condition() {
 }
 
 void Node::tick() {
+  master_->look();
   states_.publish_path();
   const Condition now = condition();
   DiagnosticsMessage message;

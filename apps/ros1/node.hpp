@@ -12,6 +12,7 @@
 #include "apps/live/live_runner.hpp"
 #include "apps/ros1/diagnostics.hpp"
 #include "apps/ros1/map_room.hpp"
+#include "apps/ros1/master_watch.hpp"
 #include "apps/ros1/parameters.hpp"
 #include "apps/ros1/sensor_inputs.hpp"
 #include "apps/ros1/state_outlet.hpp"
@@ -62,6 +63,7 @@ class Node {
   std::string legs_mismatch_;
 
   // Of the thread that ticks:
+  std::optional<MasterWatch> master_;
   std::string last_essence_;
   SteadyClock::time_point last_diagnostics_{};
   std::string last_waiting_;

@@ -93,10 +93,12 @@ void SensorInputs::receive(Sensor sensor, bool is_compressed, const Event& event
 
 void SensorInputs::take(Sensor sensor, const std::string& type, lab::Bytes bytes, Time arrived) {
   Input& input = inputs_[static_cast<std::size_t>(sensor)];
+  // Only the LiDAR's thread may look at what it has found out.
+  const lab::PointTimeFormat point_time = sensor == Sensor::lidar && point_time_ ? *point_time_ : lab::PointTimeFormat{};
   std::optional<Measurement> measurement;
   {
     const std::lock_guard lock(input.mutex);
-    measurement = input.intake.take(type, bytes, arrived, point_time_.value_or(lab::PointTimeFormat{}));
+    measurement = input.intake.take(type, bytes, arrived, point_time);
     if (measurement) input.fault.clear();
   }
   if (measurement) {

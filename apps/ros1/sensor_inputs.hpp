@@ -78,6 +78,7 @@ class SensorInputs {
 
   Sink sink_;
   double lidar_rate_;
+  // Of the thread of clouds and images:
   std::optional<lab::PointTimeFormat> point_time_;
   std::optional<lab::PointTimeSearch> search_;
   std::vector<Held> held_;

@@ -143,8 +143,17 @@ class Story:
         self.goes_on = wait_until(lambda: len(self.ears.best) > count + 100, 10)
         time.sleep(1.0)
         self.alive_without_master = self.node.running()
-        self.exit_code, self.ended_after = self.node.end()
         self.second.end(signal.SIGKILL)
+        self.master = ros_world.Master(self.port)
+        self.found_again = wait_until(lambda: self.master.subscribed("/joint_states") and "/kilvo/odometry" in self.master.published())
+        call("/kilvo/reset")
+        call("/kilvo/pause/lidar", data=False)
+        count = len(self.ears.best)
+        third = self.play(0, 3)
+        self.fed_again = wait_until(lambda: len(self.ears.best) > count + 500)
+        third.wait()
+        self.master.end(signal.SIGKILL)
+        self.exit_code, self.ended_after = self.node.end()
 
 
 class Node(unittest.TestCase):
@@ -272,6 +281,8 @@ class Node(unittest.TestCase):
     def test_lives_without_its_master_and_ends_when_asked(self):
         self.assertTrue(self.story.goes_on)
         self.assertTrue(self.story.alive_without_master)
+        self.assertTrue(self.story.found_again, "by the next master")
+        self.assertTrue(self.story.fed_again)
         self.assertEqual(self.story.exit_code, 0, self.story.node.lines[-5:])
         print(f"ended {self.story.ended_after:.2f} s after SIGINT")
         self.assertLess(self.story.ended_after, 6)
