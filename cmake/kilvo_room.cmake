@@ -8,6 +8,16 @@ add_library(kilvo_flags INTERFACE)
 target_compile_options(kilvo_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -fno-math-errno -fno-trapping-math
                                              $<$<BOOL:${KILVO_WARNINGS_AS_ERRORS}>:-Werror>)
 
+# kilvo_wide(FILE...): the functions marked KILVO_WIDE in these sources are compiled twice, for any x86-64 and for AVX2; which one runs is
+# decided when the program starts. Both give the same bits, since products and sums are not fused. Sanitizers do not stand the choice.
+set(KILVO_WIDE "")
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT CMAKE_CXX_FLAGS MATCHES "sanitize")
+  set(KILVO_WIDE "__attribute__((target_clones(\"avx2\",\"default\")))")
+endif()
+function(kilvo_wide)
+  set_source_files_properties(${ARGN} PROPERTIES COMPILE_DEFINITIONS "KILVO_WIDE=${KILVO_WIDE}")
+endfunction()
+
 function(kilvo_room name)
   cmake_parse_arguments(ROOM "" "" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)

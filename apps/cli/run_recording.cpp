@@ -131,7 +131,7 @@ class Run {
     while (auto measurement = input.next()) {
       require_legs(*measurement);
       interrupted = !pace.wait_for(input.arrived(), interrupt_);
-      if (interrupted) break;
+      if (interrupted || runner.failed()) break;
       runner.push(*std::move(measurement));
       progress_.update(input.progress(), [&runner] { return runner.waiting_for(); });
     }

@@ -6,8 +6,8 @@
 namespace kilvo::live {
 namespace {
 
-// By Sensor. Two seconds of IMU and legs at the highest rates; a scan and an image that are being waited for, and one more.
-constexpr std::array<std::size_t, sensor_count> most = {4000, 4000, 2, 2};
+// By Sensor. A second of legs, and of an IMU as fast as they; two scans and two images.
+constexpr std::array<std::size_t, sensor_count> most = {1000, 1000, 2, 2};
 
 }  // namespace
 

@@ -44,7 +44,7 @@ LiveRunner::LiveRunner(Estimator& estimator, const Robot& robot, const Estimator
   fast_ = std::thread([this] { run_fast(); });
 }
 
-LiveRunner::~LiveRunner() { stop(); }
+LiveRunner::~LiveRunner() { end(); }
 
 void LiveRunner::push(Measurement m) {
   const std::lock_guard lock(pushing_);
@@ -75,6 +75,11 @@ bool LiveRunner::is_idle() const {
 }
 
 void LiveRunner::stop() {
+  end();
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+}
+
+void LiveRunner::end() {
   if (!fast_.joinable()) return;
   {
     const std::lock_guard lock(pushing_);
@@ -268,6 +273,16 @@ void LiveRunner::tell() {
 
 // ---- the third thread
 
+void LiveRunner::carry(const std::function<void(Output)>& sink, Output output) {
+  if (failed_) return;
+  try {
+    sink(std::move(output));
+  } catch (...) {
+    failure_ = std::current_exception();
+    failed_ = true;
+  }
+}
+
 void LiveRunner::run_output() {
   settle_thread({"kilvo-output", 0, -1});
   std::vector<Output> slow;
@@ -280,12 +295,12 @@ void LiveRunner::run_output() {
       slow.swap(slow_outputs_);
     }
     for (Output& output : slow) {
-      sinks_.sweep(std::move(output));
+      carry(sinks_.sweep, std::move(output));
       ++sweeps_carried_;
     }
     slow.clear();
     while (Output* output = outputs_.front()) {
-      sinks_.state(std::move(*output));
+      carry(sinks_.state, std::move(*output));
       outputs_.pop();
     }
   }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <atomic>
+#include <exception>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -57,8 +58,10 @@ class LiveRunner {
   /// All that has been pushed has been processed, and every output has been carried away.
   bool is_idle() const;
 
-  /// What has been pushed is processed; then all threads end. More than once does nothing.
+  /// What has been pushed is processed; then all threads end. More than once does nothing. Throws what a sink threw; it is not called again.
   void stop();
+  /// A sink threw.
+  bool failed() const { return failed_; }
 
   /// After stop().
   const LiveStatistics& statistics() const { return statistics_; }
@@ -94,6 +97,8 @@ class LiveRunner {
   void tell();
   // The third.
   void run_output();
+  void carry(const std::function<void(Output)>& sink, Output output);
+  void end();
   void warn(const std::string& text);
 
   Estimator& estimator_;
@@ -113,7 +118,8 @@ class LiveRunner {
   std::uint64_t slow_outputs_dropped_ = 0;
   std::atomic<std::uint64_t> pushed_{0}, processed_{0};  // by the slow thread
   std::atomic<std::uint64_t> sweeps_out_{0}, sweeps_carried_{0};
-  std::atomic<bool> input_ended_{false}, slow_ended_{false}, fast_ended_{false};
+  std::atomic<bool> input_ended_{false}, slow_ended_{false}, fast_ended_{false}, failed_{false};
+  std::exception_ptr failure_;  // of a sink; read after its thread has ended
 
   // Of the fast thread:
   std::optional<LegKinematics> fast_kinematics_;

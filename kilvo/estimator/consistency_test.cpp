@@ -59,7 +59,7 @@ class GivenMapOdometry {
     LidarModel model(map_, clusters, mount_.T_imu_lidar.p, PoseCovariance::Zero(), lidar_, workers_);
     const auto measured = [&](const State& x, const Covariance& P) {
       Information<6> info = model(x, P);
-      add_common_noise(undistortion_noise(noise_, end - centre), info);
+      add_common_noise(undistortion_noise(noise_, end - centre).V, info);
       return info;
     };
     anchor_ = update(prior, measured, {}).posterior;

@@ -32,7 +32,7 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       config_(config),
       used_(used),
       timeline_(used, from_seconds(config.max_wait), config.wait_for_images),
-      initialiser_(config.initial, config.gravity_align),
+      initialiser_(config.initial, config.gravity_align, config.noise.accel),
       replay_(config),
       trajectory_(trajectory_length),
       map_(config.map),
@@ -178,6 +178,9 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   // On the move the first sweeps find the velocity; patches kept before that would be kept at wrong places.
   constexpr Duration to_settle = std::chrono::seconds(2);
   images_from_ = start.still ? start.estimate.t : start.estimate.t + to_settle;
+  // A sweep of an unknown velocity has no shape, and along a corridor nothing would show it. The legs tell the velocity within a step.
+  constexpr Duration a_step = std::chrono::seconds(1);
+  sweeps_from_ = start.still || !uses(Sensor::legs) ? start.estimate.t : start.estimate.t + a_step;
   if (!start.still) statistics_.warnings.push_back("the robot did not stand still: started on the move, with wide uncertainties");
   const double norm = start.resting_norm * start.accel_scale;
   if (std::abs(norm - standard_gravity) > 0.1 * standard_gravity) {

@@ -16,6 +16,7 @@
 #include "kilvo/estimator/replay.hpp"
 #include "kilvo/estimator/timeline.hpp"
 #include "kilvo/filter/trajectory.hpp"
+#include "kilvo/lidar/undistort.hpp"
 #include "kilvo/map/visual_map.hpp"
 #include "kilvo/map/voxel_map.hpp"
 #include "kilvo/sensors/robot.hpp"
@@ -93,7 +94,7 @@ class Estimator {
   void lose_legs(Time t);
   bool legs_may_return(Time t);
   void stand(const ImuSample& s);  // without any other sense, a robot that stands has no velocity
-  bool register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters, const PoseCovariance& within_scan);
+  bool register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters, const UndistortionNoise& within_scan);
   bool may_learn(const Estimate& prior, const RegistrationReport& report);
   void refuse_sweep(Time t);
   void note_outage(Time sweep_begin);
@@ -103,6 +104,7 @@ class Estimator {
   void process_pending(Time until, std::vector<Output>& out);
   bool waits_for_scan(Time image, Time until) const;
   void process(const LidarScan& scan, Time end, std::vector<Output>& out);
+  bool has_no_shape(const Estimate& prior) const;
   void learn(const LidarModel& model, const std::vector<PointCluster>& clusters);  // the map grows
   void settle(const Estimate& e);  // nothing before it will be replayed
 
@@ -146,6 +148,7 @@ class Estimator {
   bool mount_is_doubted_ = false, size_is_doubted_ = false;
   int images_in_vain_ = 0;
   Time images_from_{};  // earlier ones are not used
+  Time sweeps_from_{};  // earlier ones are used when the velocity is known
   std::vector<PointXYZI> seen_W_;      // points of the last sweep
   std::optional<Eigen::Vector3d> last_seen_from_;  // where the last image was taken, m
 

@@ -96,8 +96,10 @@ Start Initialiser::start(bool still) const {
     e.x.bg = gyro;
     e.x.ba = (accel.norm() - standard_gravity) * up_I;
     constexpr double unknown_gravity = 0.02;  // m/s^2, how much gravity differs between places
-    e.P.block<3, 3>(at::ba, at::ba) +=
-        Rt * gravity * Rt.transpose() + unknown_gravity * unknown_gravity * up_I * up_I.transpose() + 1e-6 * Eigen::Matrix3d::Identity();
+    // The mean at rest is bias less gravity, but for its own noise.
+    const double mean_variance = accel_noise_ * accel_noise_ / config_.still_time;
+    e.P.block<3, 3>(at::ba, at::ba) += Rt * gravity * Rt.transpose() + unknown_gravity * unknown_gravity * up_I * up_I.transpose() +
+                                       mean_variance * Eigen::Matrix3d::Identity();
     e.P.block<3, 3>(at::ba, at::g) = Rt * gravity;
     e.P.block<3, 3>(at::g, at::ba) = gravity * Rt.transpose();
     e.P.diagonal().segment<3>(at::bg).array() += config_.gyro_bias_sigma * config_.gyro_bias_sigma;

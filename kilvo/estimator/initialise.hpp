@@ -20,7 +20,9 @@ struct Start {
 
 class Initialiser {
  public:
-  Initialiser(const InitialConfig& config, bool gravity_align) : config_(config), gravity_align_(gravity_align) {}
+  /// `accel_noise`: density of the accelerometer's noise, m/s^2/sqrt(Hz).
+  Initialiser(const InitialConfig& config, bool gravity_align, double accel_noise)
+      : config_(config), gravity_align_(gravity_align), accel_noise_(accel_noise) {}
 
   /// The start, as soon as there is one. Samples must be finite and in time order.
   std::optional<Start> add(const ImuSample& s);
@@ -33,6 +35,7 @@ class Initialiser {
 
   InitialConfig config_;
   bool gravity_align_;
+  double accel_noise_;
   std::deque<ImuSample> window_;
   std::optional<Time> first_;
 };

@@ -10,7 +10,7 @@ namespace {
 // Feeds a constant sample (plus `shake` on the gyro) at 200 Hz until there is a start; gives up after `patience` seconds.
 std::optional<Start> start_from(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel, double shake = 0, double patience = 5,
                                 bool align = true) {
-  Initialiser initialiser(InitialConfig{}, align);
+  Initialiser initialiser(InitialConfig{}, align, ProcessNoise{}.accel);
   for (int i = 0; i < 200 * patience; ++i) {
     ImuSample s;
     s.t = time_from_ns(0) + Duration(5'000'000LL * i);
@@ -92,7 +92,7 @@ TEST(Initialiser, WithoutGravityAlignmentTheWorldIsTheFirstImuFrame) {
 }
 
 TEST(Initialiser, SaysWhatItWaitsFor) {
-  const Initialiser initialiser(InitialConfig{}, true);
+  const Initialiser initialiser(InitialConfig{}, true, ProcessNoise{}.accel);
   EXPECT_NE(initialiser.waiting_for().find("first IMU sample"), std::string::npos);
 }
 

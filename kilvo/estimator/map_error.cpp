@@ -76,6 +76,16 @@ void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epo
   now_ = H * (root * root.transpose() + systematic + weak * at(T_WI) * weak.transpose()) * H.transpose();
 }
 
+void MapError::registered_to_given(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic,
+                                   const PoseCovariance& weak) {
+  PoseCovariance A = PoseCovariance::Zero();
+  for (const EpochInformation& e : epochs) A += e.A;
+  if (!(A.topLeftCorner<3, 3>().trace() > 0) || !(A.bottomRightCorner<3, 3>().trace() > 0)) return;
+  const PoseCovariance inverse = inverse_of_known(A);
+  const PoseCovariance H = to_origin(T_WI);
+  now_ = H * (inverse * systematic * inverse + weak * at(T_WI) * weak.transpose()) * H.transpose();
+}
+
 void MapError::seen(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak, double travelled) {
   double all = 0;
   for (const EpochInformation& e : epochs) all += e.A.bottomRightCorner<3, 3>().trace();
@@ -85,7 +95,8 @@ void MapError::seen(const SE3& T_WI, std::span<const EpochInformation> epochs, c
   for (const EpochInformation& e : epochs) views += (e.A.bottomRightCorner<3, 3>().trace() / all) * G * epochs_[e.epoch] * G.transpose();
   // Each metre is wrong by the same share, so that standard deviations add.
   const PoseCovariance before = at(T_WI);
-  const double sigma = std::sqrt(std::max(0.0, (weak * before * weak.transpose()).bottomRightCorner<3, 3>().trace())), more = scale_error * travelled;
+  const double sigma = std::sqrt(std::max(0.0, (weak * before * weak.transpose()).bottomRightCorner<3, 3>().trace())),
+               more = scale_error * travelled;
   views.bottomRightCorner<3, 3>().diagonal().array() += (2 * sigma + more) * more;
   const PoseCovariance known = PoseCovariance::Identity() - weak;
   const PoseCovariance H = to_origin(T_WI);

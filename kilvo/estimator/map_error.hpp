@@ -26,6 +26,10 @@ class MapError {
   /// to its part along them) D stays what it was.
   void registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak);
 
+  /// The same with a map that was given, whose planes are where they should be. `systematic`: LidarModel::systematic().
+  void registered_to_given(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic,
+                           const PoseCovariance& weak);
+
   /// An image was held against views of these epochs, `travelled` metres after the last one. Along `weak`, which no sweep knows, D becomes
   /// what the views are wrong by.
   void seen(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak, double travelled);

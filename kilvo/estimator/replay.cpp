@@ -76,7 +76,11 @@ FootOrientations Replay::standing_at(Time t) const {
 void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   if (imu_.empty()) return;
   const FootOrientations feet = standing_at(e.t);
-  const auto step = [&](const ImuInterval& interval) {
+  const auto step = [&](ImuInterval interval) {
+    if (interval.begin < told_.until) {
+      interval.gyro_scale *= 1 - told_.rotation;
+      interval.velocity_scale *= 1 - told_.position;
+    }
     e = predict(e, interval, feet, config_.noise);
     if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
   };
@@ -153,6 +157,7 @@ void Replay::copy_since(Time t, const Replay& other) {
   for (std::size_t i = 0; i < other.steps_.size(); ++i) {
     if (i + 1 >= other.steps_.size() || other.steps_[i + 1].t > t) steps_.push_back(other.steps_[i]);
   }
+  told_ = other.told_;
   gyro_mean_ = other.gyro_mean_;
   accel_mean_ = other.accel_mean_;
   gyro_variance_ = other.gyro_variance_;

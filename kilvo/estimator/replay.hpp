@@ -38,6 +38,10 @@ class Replay {
   /// Applies one leg step to e, which must be of its time. Returns which feet of it were used and not refused.
   std::array<bool, 2> apply(Estimate& e, const LegStep& step) const;
 
+  /// A sweep until `end` has been used with points that the IMU's motion took to its middle: what they told of the pose holds these shares
+  /// of what the IMU will get wrong in rotation and in position until then.
+  void sweep_told(Time end, double rotation, double position) { told_ = {end, rotation, position}; }
+
   /// `e` came from the oldest estimate that will be replayed by advance(): a way to a later time may begin there instead.
   void remember(const Estimate& e);
   /// The last estimate remembered that is not later than `t`, else `oldest`.
@@ -59,7 +63,13 @@ class Replay {
   std::optional<Eigen::Vector3d> gyro_at(Time t) const;  // none within a gap
   FootOrientations standing_at(Time t) const;
 
+  struct Told {
+    Time until{};
+    double rotation = 0, position = 0;
+  };
+
   EstimatorConfig config_;
+  Told told_;
   Recent<ImuSample> imu_;
   Recent<LegStep> steps_;
   std::vector<Estimate> remembered_;

@@ -23,6 +23,15 @@ std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE
   return out;
 }
 
+// What the IMU gets wrong in the second half of a sweep also moved the points taken then: the share of the process noise until the end
+// that a sweep's correction of the middle has taken off. Half of it goes with the points' mean, G = 1 - P+ P^-1 of that into the pose:
+// P(end) = P+ + Q - G Q / 4 - Q G' / 4.
+template <int part>
+double told_share(const Estimate& prior, const Estimate& posterior) {
+  const Eigen::Matrix3d left = posterior.P.block<3, 3>(part, part) * prior.P.block<3, 3>(part, part).inverse();
+  return 0.5 * std::clamp(1 - left.trace() / 3, 0.0, 1.0);
+}
+
 }  // namespace
 
 void Estimator::settle(const Estimate& e) {
@@ -65,9 +74,14 @@ bool Estimator::waits_for_scan(Time image, Time until) const {
   if (ended_) return false;
   const Duration period = from_seconds(1 / robot_.lidar.rate);
   const bool expected = uses(Sensor::lidar) && last_middle_ != Time{} && last_middle_ + period <= image;
-  const bool has_passed = std::ranges::any_of(
-      pending_, [image](const Pending& p) { return std::holds_alternative<LidarScan>(p.what) && p.middle() > image; });
+  const bool has_passed =
+      std::ranges::any_of(pending_, [image](const Pending& p) { return std::holds_alternative<LidarScan>(p.what) && p.middle() > image; });
   return expected && !has_passed && until < image + 6 * period / 10 && image - last_middle_ < 3 * period;
+}
+
+bool Estimator::has_no_shape(const Estimate& prior) const {
+  constexpr double known_velocity = 0.15;  // m/s: within half a sweep, less than the smallest voxel's plane can tell
+  return prior.P.diagonal().segment<3>(at::v).maxCoeff() > known_velocity * known_velocity;
 }
 
 void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& out) {
@@ -82,6 +96,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   replay_.advance(prior, centre, &trajectory_);
   Estimate ahead = replay_.nearest(end, prior);
   replay_.advance(ahead, end, &trajectory_);
+  if (end < sweeps_from_ && has_no_shape(prior)) return drop(Sensor::lidar, "before the motion is known");
   const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
   const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size, config_.lidar.reach());
   const Eigen::Vector3d p_IL = robot_.lidar.T_imu_lidar.p;
@@ -90,7 +105,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   constexpr double to_leave = 3.0;
   if (!weak_.isZero(0)) lidar.weak_share *= to_leave;
   LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar, workers_);
-  const PoseCovariance within_scan = undistortion_noise(config_.noise, end - centre);
+  const UndistortionNoise within_scan = undistortion_noise(config_.noise, end - centre);
   const bool first = map_.empty();
   if (!register_sweep(prior, model, clusters, within_scan)) {
     refuse_sweep(end);
@@ -104,7 +119,9 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   if (good) {
     trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
     weak_ = weak_part(model.report().degeneracy);
+    if (!first) replay_.sweep_told(end, told_share<at::R>(prior, *estimate_), told_share<at::p>(prior, *estimate_));
     const bool sure = may_learn(prior, model.report());
+    if (map_is_given_) map_error_.registered_to_given(T_WI, model.by_epoch(), model.systematic(), weak_);
     if (!map_is_given_ && sure) learn(model, clusters);
     settle(*estimate_);
   }

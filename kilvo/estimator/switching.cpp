@@ -139,19 +139,22 @@ void Estimator::stand(const ImuSample& s) {
 
 // False: the sweep fits nowhere, and says nothing of the state.
 bool Estimator::register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters,
-                               const PoseCovariance& within_scan) {
+                               const UndistortionNoise& within_scan) {
   estimate_ = prior;
   if (map_.empty()) return true;
   if (!needs_search(prior.P, PoseCovariance::Identity() - weak_)) {
     UpdateConfig patient = config_.update;
     if (recovery_.sweeps_to_go > 0) patient.max_iterations *= 3;
-    const PoseCovariance noise = recovery_.sweeps_to_go > 0 ? within_scan + noise_of_velocity(prior.P) : within_scan;
+    const PoseCovariance noise = recovery_.sweeps_to_go > 0 ? within_scan.V + noise_of_velocity(prior.P) : within_scan.V;
     const auto measured = [&](const State& x, const Covariance& P) {
       Information<6> info = model(x, P);
       add_common_noise(noise, info);
       return info;
     };
-    estimate_ = update(prior, measured, patient).posterior;
+    // A prior that has lost the trace of that noise, by legs or images since, shares less of it.
+    PoseCovariance shared = within_scan.with_prediction;
+    shared.diagonal() = shared.diagonal().cwiseMax(-0.25 * prior.P.diagonal().head<6>());
+    estimate_ = update(prior, measured, patient, &shared).posterior;
     return true;
   }
   ++statistics_.searches;
@@ -160,7 +163,7 @@ bool Estimator::register_sweep(const Estimate& prior, LidarModel& model, const s
   ++statistics_.found;
   recovery_.sweeps_to_go = consistent_sweeps;
   constexpr double found_rotation = 0.006, found_position = 0.005;  // rad, m
-  PoseCovariance guessed = within_scan + noise_of_velocity(prior.P);
+  PoseCovariance guessed = within_scan.V + noise_of_velocity(prior.P);
   guessed.diagonal().head<3>().array() += found_rotation * found_rotation;
   guessed.diagonal().tail<3>().array() += found_position * found_position;
   const auto measured = [&](const State& x, const Covariance&) {

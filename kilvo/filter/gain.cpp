@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstring>
 
-#include "kilvo/math/wide.hpp"
-
 namespace kilvo {
 namespace {
 

@@ -83,7 +83,7 @@ void add_process_noise(Covariance& P, const Motion& m, const Eigen::Vector3d& up
   add(at::v, at::v, accel * dt);
   add(at::p, at::v, accel * dt * dt / 2);
   add(at::v, at::p, accel * dt * dt / 2);
-  add(at::p, at::p, accel * dt * dt * dt / 3 + interval.accel_scale * n.velocity * n.velocity * dt);
+  add(at::p, at::p, accel * dt * dt * dt / 3 + interval.accel_scale * interval.velocity_scale * n.velocity * n.velocity * dt);
   add(at::bg, at::bg, n.gyro_bias * n.gyro_bias * dt);
   add(at::ba, at::ba, n.accel_bias * n.accel_bias * dt);
   for (int foot = 0; foot < 2; ++foot) {

@@ -44,9 +44,10 @@ inline Covariance seen_at_iterate(const Covariance& P, const Eigen::Vector3d& tu
 }
 
 /// `model(iterate, prior covariance)` returns Information<N> (many rows) or Rows<N> (few rows) about the iterate. It may associate and
-/// gate anew at each iterate.
+/// gate anew at each iterate. `shared`: how the error of the prior's pose goes with noise of the pose that is common to all rows (and is
+/// in the model's R already), where what made the one made the other as well.
 template <class Model>
-Update update(const Estimate& prior, Model&& model, const UpdateConfig& config) {
+Update update(const Estimate& prior, Model&& model, const UpdateConfig& config, const PoseCovariance* shared = nullptr) {
   Update out;
   out.posterior.t = prior.t;
   State x = prior.x;
@@ -63,6 +64,13 @@ Update update(const Estimate& prior, Model&& model, const UpdateConfig& config) 
     turned = e.segment<3>(at::R);
     const Covariance& P = turned.isZero(0) ? prior.P : (seen = seen_at_iterate(prior.P, turned));
     gain.project(P, rows);
+    if (shared != nullptr) {
+      // The rows measure x plus that noise: P H' + C and S + H C + C' H'. Of S the lower triangle counts.
+      const auto C = (*shared * rows.H.template leftCols<6>().transpose()).eval();
+      const auto HC = (rows.H.template leftCols<6>() * C).eval();
+      gain.S() += HC + HC.transpose();
+      gain.W().template topRows<6>() += C;
+    }
     if (!gain.factor()) return {prior, k, false, 0};
     const ErrorVector d = gain.step(rows, e);
 

@@ -102,6 +102,35 @@ TEST(Update, InformationAndRowsGiveTheSamePosterior) {
   }
 }
 
+// Noise of the pose that all rows share and that goes with the prior's error, against the textbook with that noise as six more states.
+TEST(Update, NoiseThatGoesWithThePriorsErrorIsAsIfItWereAState) {
+  test::Random random(7);
+  constexpr int N = at::size + 6;
+  for (int trial = 0; trial < 20; ++trial) {
+    const Matrix joint = random.covariance<N>(0.1);
+    Estimate prior{time_from_ns(1), test::random_state(random), joint.topLeftCorner<at::size, at::size>()};
+    const PoseCovariance V = joint.bottomRightCorner<6, 6>();
+    // Only the pose's error goes with it.
+    const PoseCovariance shared = -0.3 * Matrix(V.diagonal().cwiseMin(prior.P.diagonal().head<6>()).asDiagonal());
+    Matrix P = Matrix::Zero(N, N);
+    P.topLeftCorner<at::size, at::size>() = prior.P;
+    P.bottomRightCorner<6, 6>() = V;
+    P.block<6, 6>(0, at::size) = shared;
+    P.block<6, 6>(at::size, 0) = shared.transpose();
+    LinearModel<12> model = random_model(random, prior.x, 8, 0, 6);
+    Matrix H(8, N);
+    H << model.H, model.H.leftCols<6>();
+    const Matrix gain = P * H.transpose() * (H * P * H.transpose() + model.R).inverse();
+    const Matrix expected = (Matrix::Identity(N, N) - gain * H) * P;
+    const ErrorVector step = -(gain * model.offset).head<at::size>();
+
+    model.R += model.H.leftCols<6>() * V * model.H.leftCols<6>().transpose();
+    const Update u = update(prior, model, UpdateConfig{1, 0, 0}, &shared);
+    EXPECT_LT((u.posterior.P - expected.topLeftCorner<at::size, at::size>()).norm(), 1e-9);
+    EXPECT_LT(boxminus(u.posterior.x, boxplus(prior.x, step)).norm(), 1e-9);
+  }
+}
+
 TEST(Update, InformationInUnitsFarApartLosesNothing) {
   test::Random random(4);
   Estimate prior = random_prior(random, 0.01);

@@ -15,6 +15,11 @@ constexpr double froude_share = 0.4;
 constexpr double swing_gain = 0.3;
 // A velocity known to this is taken as known, m/s.
 constexpr double known_velocity = 0.02;
+// At the start nothing is known of the feet of a robot whose velocity is less known than this, m/s. One that stands shows the same velocity
+// for so long, but for this, m/s; another that stands as well shows the same as well. After a while the level must do.
+constexpr double unknown_velocity = 0.15;
+constexpr Duration steady_window = milliseconds(80), longest_search = milliseconds(1000);
+constexpr double steady = 0.08, alike = 0.1;
 // At the start both feet stand that are at one level, as a share of the height of the IMU over them.
 constexpr double standing_level = 0.025;
 // A swing shorter than this, or slower than a third of the usual, teaches nothing; but several slow ones in a row are how it walks now.
@@ -36,6 +41,10 @@ constexpr Duration still_frames = milliseconds(200);
 constexpr double detection_threshold = 10;  // theta_d
 constexpr double statistics_time = 2.0;     // s
 
+double leg_length(const Feet& feet, const State& x) {
+  return std::max(std::abs((x.R * feet.foot[0].p[0]).z()), std::abs((x.R * feet.foot[1].p[0]).z()));
+}
+
 }  // namespace
 
 FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d& omega, double sigma_v) {
@@ -49,6 +58,7 @@ FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d
   out.slowest = std::max(0.0, std::sqrt(out.slowest) - 2 * std::max(0.0, sigma_v - known_velocity));
   const SolePoint low = lowest_point(foot, x.R.matrix().transpose() * up_W);
   const Eigen::Vector3d v_W = velocity_W(x, low.p, low.v, omega);
+  out.velocity = v_W;
   out.speed = v_W.norm();
   out.vertical = up_W.dot(v_W);
   out.lowest = x.pose() * low.p;
@@ -56,19 +66,60 @@ FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d
   return out;
 }
 
+// The foot that is clearly higher than the other is in the air, or will show that it is not.
+void ContactEstimator::guess_standing(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion) {
+  for (std::size_t side = 0; side < 2; ++side)
+    contacts_.on[side] = motion[side].height - motion[1 - side].height < standing_level * leg_length(feet, x);
+}
+
 void ContactEstimator::start(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion) {
-  const double leg = std::max(std::abs((x.R * feet.foot[0].p[0]).z()), std::abs((x.R * feet.foot[1].p[0]).z()));
+  const double leg = leg_length(feet, x);
   if (swing_speed_ == 0) swing_speed_ = first_guess_ = froude_share * std::sqrt(standard_gravity * std::max(leg, 0.1));
   for (std::size_t side = 0; side < 2; ++side) {
     FootState& f = foot_[side];
     f = {};
     f.since = feet.t - milliseconds(1000);
     f.ground = {-x.g.normalized(), motion[side].lowest, 0};
-    // The foot that is clearly higher than the other is in the air, or will show that it is not.
-    contacts_.on[side] = motion[side].height - motion[1 - side].height < standing_level * leg;
   }
+  guess_standing(feet, x, motion);
   ground_.forget();
   started_ = true;
+}
+
+// How much the velocity of a foot has varied lately, m/s; infinite when it has not been looked at for long enough.
+double ContactEstimator::unsteadiness(const FootState& f, Time t) const {
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (std::size_t back = 0; back < std::min(f.count, history); ++back) {
+    const Sample& s = f.samples[(f.count - 1 - back) % history];
+    low = low.cwiseMin(s.velocity);
+    high = high.cwiseMax(s.velocity);
+    if (t - s.t >= steady_window) return (high - low).norm();
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+// Whatever the velocity of the body is: the IMU tells how it changes, so that a foot that stands seems to move by what stays the same.
+bool ContactEstimator::find_standing(Time t) {
+  const std::array<double, 2> varied = {unsteadiness(foot_[0], t), unsteadiness(foot_[1], t)};
+  const std::size_t best = varied[0] <= varied[1] ? 0 : 1;
+  if (varied[best] > steady) return false;
+  const auto newest = [this](std::size_t side) { return foot_[side].samples[(foot_[side].count - 1) % history].velocity; };
+  contacts_.on[best] = true;
+  contacts_.on[1 - best] = varied[1 - best] <= steady && (newest(0) - newest(1)).norm() < alike;
+  return true;
+}
+
+void ContactEstimator::search(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion) {
+  contacts_.on = {false, false};
+  const bool found = find_standing(feet.t);
+  if (!found && feet.t - *searching_ < longest_search) return;
+  if (!found) guess_standing(feet, x, motion);
+  searching_.reset();
+  // What was seen until now was relative to an unknown velocity.
+  for (FootState& f : foot_) {
+    f.count = 0;
+    f.peak = 0;
+  }
 }
 
 // True once the cue has been there in every sample for `at_least`, and for three samples.
@@ -140,6 +191,8 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
   if (!started_) {
     contacts_.t = feet.t;
     start(feet, x, motion);
+    searching_.reset();
+    if (sigma_v > unknown_velocity) searching_ = feet.t;
   }
   period_ = std::clamp(feet.t - contacts_.t, Duration(0), Duration(milliseconds(20)));
   deviate(accel, to_seconds(period_));
@@ -149,7 +202,8 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
     const FootMotion& m = motion[side];
     // One wild sample is no peak.
     if (f.count > 0) f.peak = std::max(f.peak, std::min(m.speed, f.samples[(f.count - 1) % history].speed));
-    f.samples[f.count++ % history] = {feet.t, m.speed, m.vertical};
+    f.samples[f.count++ % history] = {feet.t, m.speed, m.vertical, m.velocity};
+    if (searching_) continue;
     const bool stood = contacts_.on[side];
     if (contacts_.on[side] && lifts(f, m, feet.t)) {
       contacts_.on[side] = false;
@@ -167,6 +221,7 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
     contacts_.clearance[side] = f.ground.height_of(m.lowest);
     contacts_.d_fv[side] = detection_threshold * m.slowest / (config_.lift_off_speed * swing_speed_);
   }
+  if (searching_) search(feet, x, motion);
   return contacts_;
 }
 

@@ -32,6 +32,7 @@ struct FootMotion {
   double slowest = 0;                                // speed of the slowest corner, m/s
   double speed = 0;                                  // of the lowest point, m/s
   double vertical = 0;                               // its upward velocity, m/s
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // its velocity, m/s
   double height = 0;                                 // of the lowest point, against gravity, m
   Eigen::Vector3d lowest = Eigen::Vector3d::Zero();  // the lowest point, m
 };
@@ -53,13 +54,15 @@ class ContactEstimator {
   /// How long a foot has been on or off, s.
   double phase(std::size_t side, Time t) const { return to_seconds(t - foot_[side].since); }
 
-  /// Forgets the feet, not the robot: after a gap in the legs' messages. Both are taken as standing until they move.
+  /// Forgets the feet, not the robot: after a gap in the legs' messages. Both are taken as standing until they move; when the velocity is
+  /// not known, none until it has shown itself: the foot that stands is the one whose velocity is wrong by what does not change.
   void restart() { started_ = false; }
 
  private:
   struct Sample {
     Time t{};
     double speed = 0, vertical = 0;
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   };
   static constexpr std::size_t history = 128;
   struct FootState {
@@ -71,6 +74,10 @@ class ContactEstimator {
     GroundPatch ground;                        // of the last place it stood on
   };
   void start(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion);
+  void guess_standing(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion);
+  bool find_standing(Time t);
+  void search(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion);
+  double unsteadiness(const FootState& f, Time t) const;
   bool lifts(FootState& f, const FootMotion& m, Time t) const;
   bool lands(FootState& f, const FootMotion& m, Time t) const;
   bool held(std::optional<Time>& since, bool cue, Time t, Duration at_least) const;
@@ -81,6 +88,7 @@ class ContactEstimator {
   LegConfig config_;
   Contacts contacts_;
   bool started_ = false;
+  std::optional<Time> searching_;             // since when no foot is known to stand
   double swing_speed_ = 0, first_guess_ = 0;  // m/s
   int slow_swings_ = 0;                       // in a row
   Duration period_{};

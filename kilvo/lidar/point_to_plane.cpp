@@ -22,6 +22,10 @@ constexpr double robust_cost = 1.014;
 // The thickness test needs a few points to say anything.
 constexpr float thickness_min_count = 4;
 
+// What leaves a plane within one voxel, a picture on a wall, is about as large as half of the voxel: were it smaller, it would not matter,
+// and were it larger, it would be the plane.
+constexpr double bumps_of_a_plane = 4;
+
 // Points looked up at once.
 constexpr std::size_t block = 256;
 
@@ -38,6 +42,17 @@ inline PointToPlaneRow row_of(const Eigen::Vector3d& p_I, const Eigen::Vector3d&
 // A += w g g'. Of symmetric sums only the lower triangles are read, but whole columns are faster.
 inline void add_outer(Eigen::Matrix<double, 6, 6>& A, const Eigen::Matrix<double, 6, 1>& g, double w) {
   for (int j = 0; j < 6; ++j) A.col(j) += (w * g[j]) * g;
+}
+
+// A point that range noise e carries outwards comes to lie in a cell that is seen at a flatter angle and weighs differently from the one
+// that it left: what the rows of a plane say together is off along the normal n by E[w e] / w = sigma^2 (dw / dr) / w, m. `variance`: of
+// one point along n. Along the plane a point moves by the sine of its angle of incidence times e, and the range by the same share of that.
+double pull_of_noise(const Eigen::Vector3d& n, const Eigen::Vector3d& beam, double variance, const LidarConfig& config) {
+  const double range = beam.norm(), cosine = n.dot(beam) / range, sine2 = 1 - cosine * cosine;
+  const double range2 = config.range_noise * config.range_noise, angle2 = config.angle_noise * config.angle_noise;
+  // On a plane at the distance h the cosine is h / r.
+  const double slope = 2 * (angle2 * range - range2 * cosine * cosine / range);
+  return -cosine * sine2 * range2 * slope / variance;
 }
 
 }  // namespace
@@ -76,7 +91,7 @@ bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluste
     const double thickness = static_cast<double>(n.dot(cluster.scatter_matrix() * n) / cluster.count);
     if (thickness > thickness_sigmas2 * (sensor + rough)) return false;
   }
-  out = {&plane, match.node, match.epoch, 0, variance, plane_variance, row};
+  out = {&plane, match.node, match.epoch, 0, variance, plane_variance, row, n_I};
   return true;
 }
 
@@ -202,6 +217,27 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   first_ = false;
   project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), info);
   return info;
+}
+
+PoseCovariance LidarModel::systematic() const {
+  std::vector<int> rows(map_.node_capacity(), 0);
+  for (const Association& a : associations_) {
+    if (a.plane != nullptr) ++rows[a.node];
+  }
+  PoseCovariance M = PoseCovariance::Zero();
+  Eigen::Matrix<double, 6, 1> pull = Eigen::Matrix<double, 6, 1>::Zero();
+  for (std::size_t i = 0; i < associations_.size(); ++i) {
+    const Association& a = associations_[i];
+    if (a.plane == nullptr) continue;
+    const double bump = std::max(1.0, rows[a.node] / bumps_of_a_plane);
+    add_outer(M, a.row.J, a.weight * a.weight * bump * static_cast<double>(a.plane->roughness_variance));
+    // A point that is alone in its cell weighs as it does itself.
+    const double count = clusters_[i].count, together = 1 - 1 / count;
+    pull += a.weight * together * pull_of_noise(a.n_I, clusters_[i].mean.cast<double>() - p_IL_, a.variance * count, config_) * a.row.J;
+  }
+  M += pull * pull.transpose();
+  const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
+  return known.transpose() * M.selfadjointView<Eigen::Lower>() * known;
 }
 
 std::vector<EpochInformation> LidarModel::by_epoch() const {

@@ -42,6 +42,10 @@ class LidarModel {
 
   const RegistrationReport& report() const { return report_; }
 
+  /// What the next sweeps will get wrong in the same way, so that they do not average it down: roughness of the planes, and what range
+  /// noise does through the weights. Covariance of b = sum w r J of the last evaluation, without the weak directions.
+  PoseCovariance systematic() const;
+
   /// The information of the last evaluation, by epoch of the map, without the weak directions.
   std::vector<EpochInformation> by_epoch() const;
 
@@ -54,6 +58,7 @@ class LidarModel {
     double variance = 0;        // of the cluster's mean along the normal: measurement and roughness, m^2
     double plane_variance = 0;  // of the plane under it, common to all clusters of the plane, m^2
     PointToPlaneRow row;
+    Eigen::Vector3d n_I = Eigen::Vector3d::Zero();  // normal of the plane
   };
 
   struct Sums;

@@ -89,14 +89,19 @@ std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajec
   return out;
 }
 
-PoseCovariance undistortion_noise(const ProcessNoise& noise, Duration half_scan) {
-  // A point at the time t from the middle carries |t| of the random walk: T / 6 for a surface that is seen all the time (both halves
-  // average), T / 2 for one that is seen once. A turning scanner is between.
-  const double share = to_seconds(half_scan) / 3;
-  PoseCovariance V = PoseCovariance::Zero();
-  V.diagonal().head<3>().setConstant(share * noise.gyro * noise.gyro);
-  V.diagonal().tail<3>().setConstant(share * noise.velocity * noise.velocity);
-  return V;
+UndistortionNoise undistortion_noise(const ProcessNoise& noise, Duration half_scan) {
+  // A point at the time t from the middle carries |t| of a random walk. The mean over a scan of 2 T, each half by itself, has T / 6 of it
+  // when all points tell the same, up to T / 4.5 when they tell it twice in a turn (walls ahead and behind). With the walk over a whole
+  // half it has T / 4 in common: the mean of |t|, halved.
+  constexpr double own = 0.2, common = 0.25;
+  Eigen::Matrix<double, 6, 1> density;
+  density.head<3>().setConstant(noise.gyro * noise.gyro);
+  density.tail<3>().setConstant(noise.velocity * noise.velocity);
+  const double T = to_seconds(half_scan);
+  UndistortionNoise out;
+  out.V.diagonal() = own * T * density;
+  out.with_prediction.diagonal() = -common * T * density;
+  return out;
 }
 
 }  // namespace kilvo

@@ -24,8 +24,14 @@ struct PointDrops {
 /// lie within it. Points without a pose (up to `slack` outside is taken as the end pose) are dropped and counted.
 std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajectory, Time at, const LidarMount& mount, PointDrops& drops);
 
-/// What the IMU's noise within a scan, seen from its middle, does to the pose that its points tell: the mean of a random walk over half
-/// of the scan, for a scanner that turns shows each surface in one half or the other. Of (rotation, position), common to all points.
-PoseCovariance undistortion_noise(const ProcessNoise& noise, Duration half_scan);
+/// What the IMU's noise within a scan, seen from its middle, does to the pose that its points tell. Of (rotation, position), common to all
+/// points.
+struct UndistortionNoise {
+  PoseCovariance V = PoseCovariance::Zero();  // its covariance
+  /// How it goes with the prediction over the first half of the scan, which the same noise has moved: opposite, so negative; and, by its
+  /// size, with that over the second half, which has yet to be made.
+  PoseCovariance with_prediction = PoseCovariance::Zero();
+};
+UndistortionNoise undistortion_noise(const ProcessNoise& noise, Duration half_scan);
 
 }  // namespace kilvo

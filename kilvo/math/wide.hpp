@@ -1,14 +1,8 @@
-// Loops over many numbers are compiled twice, for any processor and for those with wide registers; which one runs is decided when the
-// program starts. Both give the same bits: products and sums are not fused.
+// Numbers that are worked on together. Functions that do so are marked KILVO_WIDE (cmake/kilvo_room.cmake): compiled for any processor and
+// for those with wide registers.
 #pragma once
 
 #include <cstddef>
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define KILVO_WIDE [[gnu::target_clones("avx2", "default")]]
-#else
-#define KILVO_WIDE
-#endif
 
 namespace kilvo {
 

@@ -20,7 +20,8 @@ struct NewPoint {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
 };
 
-/// The best corner of each cell of the image that has no track, where the ray of its pixel meets the plane of the LiDAR point seen there.
+/// The best corner of each cell of the image that has no track, where the ray of its pixel meets the plane of the LiDAR point seen there;
+/// where there are few of them, some plain patches as well.
 std::vector<NewPoint> new_points(const VoxelMap& map, const Camera& camera, const SE3& T_CW, const GreyImage& image, const DepthView& depth,
                                  std::span<const Track> tracks, const VisionConfig& config);
 

@@ -26,8 +26,8 @@ struct Template {
   std::array<float, count> value, dx, dy;
 };
 
-/// The patch seen through `A` (pixels of the patch's image by pixels of the view, both of level 0), at a level of the view; from the level of
-/// the patch that is nearest in scale. None when the scales do not fit, or the patch is too small.
+/// The patch seen through `A` (pixels of the patch's image by pixels of the view, both of level 0), at a level of the view; from the level
+/// of the patch that is nearest in scale. None when the scales do not fit, or the patch is too small.
 std::optional<Template> warp(const Observation& from, const Eigen::Matrix2d& A, int level);
 
 /// The 8x8 pixels of a view around a pixel of its own level, which must be at least 5 px within.

@@ -6,7 +6,6 @@
 #include <map>
 
 #include "kilvo/filter/pose_error.hpp"
-#include "kilvo/math/wide.hpp"
 
 namespace kilvo {
 namespace {
@@ -15,77 +14,8 @@ namespace {
 constexpr double robust_sigmas = 1.5;
 // Pixels a patch needs around it at its level.
 constexpr double border = 5;
-// Brighter pixels are taken as saturated.
-constexpr float bright = 252;
 // An expected error of so many pixels is within reach of the finest level; twice that of the next.
 constexpr double reach = 0.7;
-
-using Values = std::array<float, Template::count>;
-
-struct Sums {
-  float xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top;
-};
-
-// Over the pixels, in lanes that are added at the end.
-KILVO_WIDE Sums sum_up(const Template& patch, const Values& image, float t, float tp) {
-  Lanes xx{}, xy{}, yy{}, sx{}, sy{}, xr{}, yr{}, sr{}, rr{}, sum{}, top{};
-  for (std::size_t k = 0; k < Template::count; k += lanes) {
-    Lanes value, seen, x, y;
-    read_lanes(value, &patch.value[k]);
-    read_lanes(seen, &image[k]);
-    read_lanes(x, &patch.dx[k]);
-    read_lanes(y, &patch.dy[k]);
-    x *= tp;
-    y *= tp;
-    const Lanes r = t * seen - tp * value;
-    xx += x * x;
-    xy += x * y;
-    yy += y * y;
-    sx += x;
-    sy += y;
-    xr += x * r;
-    yr += y * r;
-    sr += r;
-    rr += r * r;
-    sum += value;
-    const Lanes brighter = value > seen ? value : seen;
-    top = brighter > top ? brighter : top;
-  }
-  float most = 0;
-  for (std::size_t i = 0; i < lanes; ++i) most = std::max(most, top[i]);
-  return {total(xx), total(xy), total(yy), total(sx), total(sy), total(xr), total(yr), total(sr), total(rr), total(sum), most};
-}
-
-PatchSums sums_of(const Template& patch, const Values& image, double tau, double tau_patch, double bias_variance, double variance) {
-  const auto t = static_cast<float>(tau), tp = static_cast<float>(tau_patch);
-  // The gradient is the patch's, so that it stays the same from iterate to iterate. The exposure is known by the patch's mean alone: by its
-  // contrast, noise that is in the patch and in r would make each generation of patches look a little darker than the last.
-  const Sums sums = sum_up(patch, image, t, tp);
-  const auto& [xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top] = sums;
-  constexpr double n = Template::count;
-  PatchSums out;
-  out.saturated = top > bright;
-  const double i = static_cast<double>(tp / t * sum) / n;
-  const Eigen::Vector3d s(static_cast<double>(sx), static_cast<double>(sy), n * i);
-  out.A << static_cast<double>(xx), static_cast<double>(xy), i * s[0], static_cast<double>(xy), static_cast<double>(yy), i * s[1], i * s[0],
-      i * s[1], n * i * i;
-  out.b << static_cast<double>(xr), static_cast<double>(yr), i * static_cast<double>(sr);
-  const double pixels = n + variance / bias_variance;
-  out.A -= s * s.transpose() / pixels;
-  out.b -= s * static_cast<double>(sr) / pixels;
-  out.mean_square = (static_cast<double>(rr) - static_cast<double>(sr) * static_cast<double>(sr) / n) / (n - 1);
-  return out;
-}
-
-float mean_of(const Values& values) {
-  Lanes sum{};
-  for (std::size_t k = 0; k < Template::count; k += lanes) {
-    Lanes v;
-    read_lanes(v, &values[k]);
-    sum += v;
-  }
-  return total(sum) / Template::count;
-}
 
 double median_of(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -132,7 +62,6 @@ PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, c
       config_(config),
       prepared_(tracks.size()),
       verdicts_(tracks.size()) {
-  report_.tracks = static_cast<int>(tracks.size());
   std::map<std::uint32_t, int> patches_of_node;
   for (const Track& t : tracks) ++patches_of_node[map.point(t.point).node];
   const PoseCovariance P = prior.P.topLeftCorner<6, 6>();
@@ -145,6 +74,8 @@ PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, c
     p.p_W = tracks[i].observation == point.observations[0] ? point.p_W : on_own_ray(camera, o, frame, point);
     p.tau = frame.tau;
     p.frame = o.frame;
+    p.plain = tracks[i].plain;
+    if (!p.plain) ++report_.tracks;
     p.depth_variance = static_cast<double>(point.variance) * patches_of_node[point.node];
     const Eigen::Vector3d ray = point.p_W + frame.T_CW.R.inverse() * frame.T_CW.p;
     p.slide_W = ray / point.normal_W.cast<double>().dot(ray);
@@ -168,7 +99,7 @@ PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x)
   const Prepared& p = prepared_[i];
   Verdict& verdict = verdicts_[i];
   verdict = {};
-  if (!p.patch) return out;
+  if (!p.patch || p.plain) return out;
   const auto view = view_of(camera_, T_CI_, x.pose(), p.p_W);
   if (!view) return out;
   const GreyImage& image = pyramid_[static_cast<std::size_t>(level_)];
@@ -274,7 +205,7 @@ Information<7> PhotometricModel::operator()(const State& x, const Covariance& pr
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     parts[i] = evaluate(i, x);
     if (parts[i].valid) ratios.push_back(parts[i].sums.mean_square / parts[i].expected_variance);
-    if (!parts[i].valid && prepared_[i].patch && !parts[i].sums.saturated) ++report_.unlike;
+    if (!parts[i].valid && prepared_[i].patch && !prepared_[i].plain && !parts[i].sums.saturated) ++report_.unlike;
   }
   // Noise of the pixels that nobody configured: of the whole image.
   const double scale2 = ratios.empty() ? 1 : std::max(1.0, median_of(ratios));
@@ -304,8 +235,7 @@ Information<7> PhotometricModel::operator()(const State& x, const Covariance& pr
 }
 
 std::optional<double> PhotometricModel::exposure_at(const State& x) const {
-  constexpr std::size_t enough = 8;
-  std::vector<double> ratios;
+  std::vector<double> ratios, of_plain;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     const Prepared& p = prepared_[i];
     const auto view = view_of(camera_, T_CI_, x.pose(), p.p_W);
@@ -314,9 +244,12 @@ std::optional<double> PhotometricModel::exposure_at(const State& x) const {
     sample_patch(pyramid_[static_cast<std::size_t>(level_)], at_level(view->pixel, level_).cast<float>(), seen);
     const float here = mean_of(seen), there = mean_of(p.patch->value);
     constexpr float dark = 8, light = 240;
-    if (here > dark && here < light && there > dark && there < light) ratios.push_back(p.tau * static_cast<double>(there / here));
+    if (here > dark && here < light && there > dark && there < light)
+      (p.plain ? of_plain : ratios).push_back(p.tau * static_cast<double>(there / here));
   }
-  if (ratios.size() < enough) return std::nullopt;
+  // A plain surface is known to be the same only by where it is.
+  if (ratios.size() < enough_corners) ratios.insert(ratios.end(), of_plain.begin(), of_plain.end());
+  if (ratios.size() < enough_corners) return std::nullopt;
   return median_of(ratios);
 }
 

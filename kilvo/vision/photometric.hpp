@@ -1,6 +1,6 @@
 // The visual measurement (paper, Eq. 12): patches of the visual map against the image, directly by their grey values, with the inverse
-// exposure time as a state. The pixels of one patch are summed into what they say of its place in the image and of the exposure; only then does the
-// pose enter, so that what is uncertain about a patch as a whole (depth, calibration) is noise of the patch, not of each pixel.
+// exposure time as a state. The pixels of one patch are summed into what they say of its place in the image and of the exposure; only then
+// does the pose enter, so that what is uncertain about a patch as a whole (depth, calibration) is noise of the patch, not of each pixel.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,6 +12,7 @@
 #include "kilvo/filter/measurement_rows.hpp"
 #include "kilvo/map/visual_map.hpp"
 #include "kilvo/vision/camera.hpp"
+#include "kilvo/vision/patch_sums.hpp"
 #include "kilvo/vision/patches.hpp"
 #include "kilvo/vision/select_tracks.hpp"
 #include "kilvo/vision/vision_config.hpp"
@@ -20,22 +21,13 @@ namespace kilvo {
 
 /// One patch at one iterate: where it is seen and how that moves with the pose.
 struct PatchView {
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();                              // level 0
-  Eigen::Matrix<double, 2, 6> J = Eigen::Matrix<double, 2, 6>::Zero();          // by (rotation, position), px/rad and px/m
-  Eigen::Matrix<double, 2, 3> J_point = Eigen::Matrix<double, 2, 3>::Zero();    // by the point in the world, px/m
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();                            // level 0
+  Eigen::Matrix<double, 2, 6> J = Eigen::Matrix<double, 2, 6>::Zero();        // by (rotation, position), px/rad and px/m
+  Eigen::Matrix<double, 2, 3> J_point = Eigen::Matrix<double, 2, 3>::Zero();  // by the point in the world, px/m
 };
 
 /// Where a point of the world is seen from a pose of the IMU, and the derivatives; none when it is not.
 std::optional<PatchView> view_of(const Camera& camera, const SE3& T_CI, const SE3& T_WI, const Eigen::Vector3d& p_W);
-
-/// r = tau I(u) - tau_r T, summed over the pixels of a patch: A = sum h h', b = sum h r over h = dr/d(u, v, tau), less what the brightness of the
-/// patch may have changed by itself.
-struct PatchSums {
-  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d b = Eigen::Vector3d::Zero();
-  double mean_square = 0;  // of r, less its mean
-  bool saturated = false;
-};
 
 class PhotometricModel {
  public:
@@ -83,6 +75,7 @@ class PhotometricModel {
     double depth_variance = 0;                          // of the surface, shared by all patches on it
     double tau = 1;                                     // of the observation's frame
     std::uint32_t frame = 0;
+    bool plain = false;  // of use for the exposure alone
     std::optional<Template> patch;
   };
   struct Part {

@@ -22,6 +22,11 @@ class Photometric : public testing::Test {
       groups.push_back(g);
     }
     surfaces_.insert(groups, 0);
+    remember();
+  }
+
+  // What the wall looks like from where the world begins.
+  void remember() {
     const SE3 T_CW = T_CI_;
     const auto pyramid = pyramid_of(scene_.image(camera_, {}), Patch::levels);
     VisualFrame frame;
@@ -80,8 +85,8 @@ class Photometric : public testing::Test {
   PhotometricModel::Report report_;
 };
 
-// Root mean square of how far points of the wall are seen from where they really are, px: what an image can know. (That the camera turned and
-// that it stepped aside look nearly alike on a wall.)
+// Root mean square of how far points of the wall are seen from where they really are, px: what an image can know. (That the camera turned
+// and that it stepped aside look nearly alike on a wall.)
 double pixels_off(const Camera& camera, const SE3& T_CI, const State& x, const SE3& truth) {
   double sum = 0;
   int count = 0;
@@ -101,6 +106,22 @@ ErrorVector error_of(const Update& u, const SE3& truth) {
   x.R = truth.R;
   x.p = truth.p;
   return boxminus(u.posterior.x, x);
+}
+
+TEST_F(Photometric, BeforeABlankWallTheExposureIsFollowedAndThePoseLeftAlone) {
+  scene_.contrast = 0;
+  map_ = VisualMap({});
+  remember();
+  EXPECT_GT(map_.size(), 8U);
+  EXPECT_LT(map_.size(), 30U);
+  const Estimate prior = prior_at(moved, twist(0.002, -0.001, 0.002, 0.004, 0.003, -0.002));
+  for (const double brightness : {0.6, 1.0, 1.6}) {
+    const Update u = see(scene_.image(camera_, moved, brightness, 1.5), prior);
+    EXPECT_NEAR(u.posterior.x.tau * brightness, 1, 0.01);
+    EXPECT_EQ(u.rows, 0);
+    EXPECT_EQ(report_.tracks, 0) << "a patch without corners is none that could have agreed";
+    EXPECT_EQ((u.posterior.x.p - prior.x.p).norm(), 0);
+  }
 }
 
 TEST_F(Photometric, TheMapIsOnTheWallAndSpreadOverTheImage) {
@@ -125,7 +146,8 @@ TEST_F(Photometric, WhereAPointIsSeenMovesWithThePoseAsTheJacobianSays) {
     }
     for (int k = 0; k < 3; ++k) {
       const Eigen::Vector3d step = h * Eigen::Vector3d::Unit(k);
-      const Eigen::Vector2d difference = view_of(camera_, T_CI_, moved, p_W + step)->pixel - view_of(camera_, T_CI_, moved, p_W - step)->pixel;
+      const Eigen::Vector2d difference =
+          view_of(camera_, T_CI_, moved, p_W + step)->pixel - view_of(camera_, T_CI_, moved, p_W - step)->pixel;
       EXPECT_LT((view->J_point.col(k) - difference / (2 * h)).norm(), 1e-4 * std::max(1.0, view->J_point.col(k).norm())) << k;
     }
   }

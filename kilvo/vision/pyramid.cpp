@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "kilvo/math/wide.hpp"
-
 namespace kilvo {
 namespace {
 

@@ -110,6 +110,7 @@ std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, con
       // A point without a usable view would keep others out of its cell for ever.
       Track track;
       track.point = id;
+      track.plain = static_cast<double>(p.corner) < config.min_corner;
       track.pixel = *pixel;
       if (choose_observation(view, p, track)) best = {worth, track};
     });
@@ -118,6 +119,8 @@ std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, con
   for (const Best& best : cells) {
     if (best.worth > 0) tracks.push_back(best.track);
   }
+  const std::size_t corners = tracks.size() - static_cast<std::size_t>(std::ranges::count_if(tracks, &Track::plain));
+  if (corners >= enough_corners) std::erase_if(tracks, [](const Track& t) { return t.plain; });
   return tracks;
 }
 

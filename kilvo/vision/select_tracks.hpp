@@ -16,9 +16,10 @@ namespace kilvo {
 struct Track {
   std::uint32_t point = 0;
   std::uint32_t observation = 0;
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();      // where it is expected
-  Eigen::Matrix2d A = Eigen::Matrix2d::Identity();      // pixels of the observation's image by pixels of this one
-  double view_angle = 0;                                // between the two views of the point, rad
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // where it is expected
+  Eigen::Matrix2d A = Eigen::Matrix2d::Identity();  // pixels of the observation's image by pixels of this one
+  bool plain = false;                               // without corners: how bright it is says what the exposure is, no more
+  double view_angle = 0;                            // between the two views of the point, rad
 };
 
 /// The grid of cells of the image.
@@ -34,6 +35,9 @@ class CellGrid {
  private:
   int cell_, columns_, rows_;
 };
+
+/// So many tell the exposure by themselves: then plain patches are neither begun nor looked at.
+inline constexpr std::size_t enough_corners = 8;
 
 /// What the camera at T_CW should see of the map.
 std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,

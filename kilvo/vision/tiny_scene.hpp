@@ -13,7 +13,8 @@ namespace kilvo::tiny {
 
 /// The plane x = 3, seen by a camera that looks along x from near the origin; its texture has no edges sharper than some pixels.
 struct Scene {
-  double wall = 3.0;  // m
+  double wall = 3.0;    // m
+  double contrast = 1;  // 0: blank
 
   static CameraMount mount() {
     CameraMount m;
@@ -45,7 +46,7 @@ struct Scene {
       for (int u = 0; u < camera.width(); ++u) {
         const Eigen::Vector3d ray = T_WC.R * *camera.unproject({u, v});
         const Eigen::Vector3d hit = T_WC.p + ray * ((wall - T_WC.p.x()) / ray.x());
-        const double value = brightness * grey(hit.y(), hit.z()) + noise * normal(random);
+        const double value = brightness * (120 + contrast * (grey(hit.y(), hit.z()) - 120)) + noise * normal(random);
         out.pixels.push_back(static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0))));
       }
     }

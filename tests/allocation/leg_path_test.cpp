@@ -3,8 +3,11 @@
 #include <cstdlib>
 #include <gtest/gtest.h>
 #include <new>
+#include <optional>
+#include <utility>
 
 #include "kilvo/estimator/estimator.hpp"
+#include "kilvo/estimator/forerunner.hpp"
 #include "lab/settings/settings.hpp"
 #include "lab/simulation/description.hpp"
 #include "lab/simulation/simulator.hpp"
@@ -42,14 +45,27 @@ void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { s
 namespace kilvo {
 namespace {
 
-TEST(LegPath, TakesNoMemoryOnceItIsWarm) {
+struct LegWalk {
+  explicit LegWalk(double seconds) : config(of(seconds)), simulator(room(), config) {}
+  static lab::SimulatorConfig of(double seconds) {
+    lab::SimulatorConfig config;
+    config.duration = seconds;
+    config.use = {true, true, false, false};
+    return config;
+  }
+  static const lab::Scenario& room() { return *std::ranges::find(lab::scenarios(), std::string("room"), &lab::Scenario::name); }
+
   lab::SimulatorConfig config;
-  config.duration = 11;
-  config.use = {true, true, false, false};
-  const auto& room = *std::ranges::find(lab::scenarios(), std::string("room"), &lab::Scenario::name);
-  lab::Simulator simulator(room, config);
-  const lab::Settings settings =
+  lab::Simulator simulator;
+  lab::Settings settings =
       lab::parse_settings(lab::simulated_config(config, "sim.urdf"), "simulated", std::string(KILVO_SOURCE_DIR) + "/config/robots");
+};
+
+TEST(LegPath, TakesNoMemoryOnceItIsWarm) {
+  LegWalk walk(11);
+  lab::Simulator& simulator = walk.simulator;
+  const lab::Settings& settings = walk.settings;
+  const lab::SimulatorConfig& config = walk.config;
   Estimator estimator(settings.robot, settings.estimator, config.use);
   std::vector<Output> outputs;
   long samples = 0, steps = 0;
@@ -69,7 +85,39 @@ TEST(LegPath, TakesNoMemoryOnceItIsWarm) {
   }
   EXPECT_GT(samples, 3500);
   EXPECT_GT(steps, 10) << "feet must come and go";
-  EXPECT_EQ(allocations, 0) << "in " << samples << " leg samples";
+  EXPECT_EQ(std::exchange(allocations, 0), 0) << "in " << samples << " leg samples";
+}
+
+TEST(Forerunner, TakesNoMemoryOnceItIsWarm) {
+  LegWalk walk(9);
+  Estimator estimator(walk.settings.robot, walk.settings.estimator, walk.config.use);
+  LegKinematics kinematics(walk.settings.robot);
+  Forerunner runner(walk.settings.robot, walk.settings.estimator);
+  long outputs = 0;
+  bool warm = false;
+  std::optional<Time> forked;
+  while (auto m = walk.simulator.next()) {
+    const auto* imu = std::get_if<ImuSample>(&*m);
+    const auto* joints = std::get_if<JointSample>(&*m);
+    warm = walk.simulator.seconds_of(walk.simulator.measured()) > 6;
+    counting = warm;
+    if (imu != nullptr) runner.push(*imu);
+    if (joints != nullptr) {
+      const auto feet = kinematics.feet(*joints);
+      if (const auto* known = std::get_if<Feet>(&feet); known != nullptr && runner.push(*known)) outputs += runner.output().t > Time{} && warm ? 1 : 0;
+    }
+    counting = false;
+    const Time t = stamp_of(*m);
+    estimator.push(*std::move(m));
+    if (!forked || t - *forked > from_seconds(0.1)) {
+      counting = warm;
+      estimator.fork(runner);
+      counting = false;
+      forked = t;
+    }
+  }
+  EXPECT_GT(outputs, 2500);
+  EXPECT_EQ(allocations, 0) << "in " << outputs << " outputs";
 }
 
 }  // namespace

@@ -39,6 +39,26 @@ struct Sample {
 };
 using Samples = std::vector<Sample>;  // by tenth of a second after the start
 
+double square(double x) { return x * x; }
+
+// What a foot's velocity, as encoders and gyro tell it, is wrong by when its sole does not move: densities, m^2/s.
+struct LegDensity {
+  double across, vertical;
+};
+LegDensity leg_density(const lab::SimulatorConfig& config) {
+  const lab::BipedShape& shape = config.shape;
+  const double ankle = shape.sole_depth, knee = ankle + shape.shin, hip = knee + shape.thigh;
+  // Hip, knee and ankle turn about one axis each way. The vertical only has the way from under them to where the sole stands, half a step.
+  const double lever = std::hypot(hip, knee, ankle), vertical_lever = 0.2;
+  const double imu_height = hip - shape.hip.z() + shape.T_torso_imu().p.z();
+  constexpr double stance = 0.55, knee_rate = 1.5;  // s, rad/s: what is wrong with a joint's zero is so for a stance
+  const auto of_joints = [&](double l) {
+    return square(l * config.joints.velocity_noise) / config.joints.delivery.rate +
+           square(l * config.joints.offset_sigma * knee_rate) * stance;
+  };
+  return {of_joints(lever) + square(imu_height * config.imu.gyro_noise), of_joints(vertical_lever)};
+}
+
 /// One simulated walk, estimated by some of its sensors.
 class Walk {
  public:
@@ -56,6 +76,16 @@ class Walk {
 
   Samples estimated_by(std::array<bool, sensor_count> used) const {
     Estimator estimator(settings_.robot, settings_.estimator, used);
+    return samples_of(estimator);
+  }
+
+  /// By the legs, with the noise of these legs on this floor and not of any on any.
+  Samples estimated_by_rigid_legs() const {
+    EstimatorConfig config = settings_.estimator;
+    const LegDensity density = leg_density(simulator_->config());
+    config.legs.velocity_correlation = density.across / square(config.legs.velocity_sigma);
+    config.legs.vertical_velocity_sigma = std::sqrt(density.vertical / config.legs.velocity_correlation);
+    Estimator estimator(settings_.robot, config, {true, true, false, false});
     return samples_of(estimator);
   }
 
@@ -130,6 +160,7 @@ class Consistency : public testing::Test {
       const Walk walk(first + k, number_of("KILVO_SECONDS", 8));
       All out;
       for (const auto& used : {li, kil, ki}) out.runs[used].push_back(walk.estimated_by(used));
+      out.rigid.push_back(walk.estimated_by_rigid_legs());
       for (const auto& used : {li, kil}) out.known[used].push_back(walk.estimated_in_known_world_by(used));
       return out;
     });
@@ -156,9 +187,11 @@ class Consistency : public testing::Test {
   using Runs = std::map<std::array<bool, sensor_count>, std::vector<Samples>>;  // by the sensors that were used
   struct All {
     Runs runs, known;  // with its own map, with the true one
+    std::vector<Samples> rigid;
 
     All& operator+=(const All& o) {
       for (const auto& [used, more] : o.runs) runs[used].insert(runs[used].end(), more.begin(), more.end());
+      rigid.insert(rigid.end(), o.rigid.begin(), o.rigid.end());
       for (const auto& [used, more] : o.known) known[used].insert(known[used].end(), more.begin(), more.end());
       return *this;
     }
@@ -208,21 +241,30 @@ void expect_strict(const char* name, const std::vector<Samples>& runs, double Sa
   const Limits in = limits(degrees, runs.size());
   const auto all = Consistency::share(runs, part, in.low, in.high);
   testing::Test::RecordProperty(name, std::to_string(all.mean) + " inside at " + std::to_string(all.inside));
-  EXPECT_GE(all.inside, 0.9) << "mean NEES of " << name << ' ' << all.mean << " of " << degrees;
+  // Errors go on for most of a second, so that 8 s are ten times and 95 of 100 among them a matter of luck: three deviations less.
+  const double enough = runs.size() < 50 ? 0.75 : 0.9;
+  EXPECT_GE(all.inside, enough) << "mean NEES of " << name << ' ' << all.mean << " of " << degrees;
 }
 
 TEST_F(Consistency, InAKnownWorldTheErrorOfLiIsWhatTheCovarianceSays) {
   expect_strict("rotation", all_.known.at(li), &Sample::rotation, 3);
   expect_strict("position", all_.known.at(li), &Sample::position, 3);
+  expect_strict("velocity", all_.known.at(li), &Sample::velocity, 3);
 }
 
 TEST_F(Consistency, InAKnownWorldTheErrorOfKilIsWhatTheCovarianceSays) {
   expect_strict("rotation", all_.known.at(kil), &Sample::rotation, 3);
   expect_strict("position", all_.known.at(kil), &Sample::position, 3);
+  expect_strict("velocity", all_.known.at(kil), &Sample::velocity, 3);
 }
 
-// On the legs alone only from above: what a standing foot of a real robot does, bend and roll, is in the filter's noise, and a simulated
-// sole does none of it.
+TEST_F(Consistency, OnLegsOfKnownNoiseVelocityAndTiltAreAsGoodAsTheCovarianceSays) {
+  expect_strict("velocity", all_.rigid, &Sample::velocity, 3);
+  expect_strict("tilt", all_.rigid, &Sample::tilt, 2);
+}
+
+// With the noise that is shipped only from above: what a standing foot of a real robot does, settle, bend and roll, on any floor, is in it,
+// and a simulated sole on a rigid floor does none of that.
 TEST_F(Consistency, OnTheLegsAloneVelocityAndTiltAreNotBelievedMoreThanTheyAreKnown) {
   const std::vector<Samples>& runs = all_.runs.at(ki);
   const Share velocity = share(runs, &Sample::velocity, 0, limits(3, runs.size()).high);

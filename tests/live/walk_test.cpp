@@ -128,5 +128,20 @@ TEST(LiveWalk, WithoutAnImuThereIsNoPoseAfterOneThatSaysSo) {
   EXPECT_EQ(lost->modality, Modality::coast);
 }
 
+TEST(LiveWalk, WhatASinkThrowsEndsInStop) {
+  Estimator estimator(walk().settings().robot, walk().settings().estimator, walk().used());
+  int calls = 0;
+  live::LiveRunner runner(estimator, walk().settings().robot, walk().settings().estimator, walk().used(), {},
+                          {[&calls](const Output&) {
+                             ++calls;
+                             throw std::runtime_error("disk full");
+                           },
+                           [](const Output&) {}});
+  walk().play({}, [&runner](Measurement m) { runner.push(std::move(m)); });
+  EXPECT_THROW(runner.stop(), std::runtime_error);
+  EXPECT_TRUE(runner.failed());
+  EXPECT_EQ(calls, 1);
+}
+
 }  // namespace
 }  // namespace kilvo
