@@ -14,7 +14,7 @@ struct PackedPoint {
 CloudMessage empty_cloud(std::size_t points, Time t, const std::string& frame, const char* fourth) {
   CloudMessage out;
   out.header.stamp = ros_time(t);
-  out.header.frame_id = frame.c_str();
+  out.header.frame_id = std::string_view(frame);
   out.height = 1;
   out.width = static_cast<std::uint32_t>(points);
   std::uint32_t offset = 0;

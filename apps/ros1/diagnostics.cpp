@@ -11,21 +11,21 @@ constexpr double least_silence = 0.2, periods_of_silence = 3;  // s, -
 
 void add(DiagnosticStatus& status, const std::string& key, const std::string& value) {
   DiagnosticValue entry;
-  entry.key = key.c_str();
-  entry.value = value.c_str();
+  entry.key = std::string_view(key);
+  entry.value = std::string_view(value);
   status.values.push_back(entry);
 }
 
 DiagnosticStatus named(const std::string& name) {
   DiagnosticStatus out;
-  out.name = ("kilvo: " + name).c_str();
+  out.name = std::string_view("kilvo: " + name);
   out.hardware_id = "kilvo";
   return out;
 }
 
 void say(DiagnosticStatus& status, std::uint8_t level, const std::string& text) {
   status.level = static_cast<decltype(status.level)>(level);
-  status.message = text.c_str();
+  status.message = std::string_view(text);
 }
 
 /// The level and the reason; nothing when the sensor is well.

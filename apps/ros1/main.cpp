@@ -45,7 +45,7 @@ class CommandLine {
     std::erase_if(words_, [this](const char* word) {
       const std::string_view text = word;
       const std::size_t sign = text.find(":=");
-      const bool is_parameter = sign != text.npos && text.starts_with('_') && !text.starts_with("__");
+      const bool is_parameter = sign != std::string_view::npos && text.starts_with('_') && !text.starts_with("__");
       if (is_parameter) parameters_.emplace_back(text.substr(1, sign - 1), text.substr(sign + 2));
       return is_parameter;
     });

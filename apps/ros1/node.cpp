@@ -144,7 +144,7 @@ bool Node::save_map(TriggerAnswer& answer) {
   try {
     const std::size_t points = map_.save(path);
     answer.success = 1;
-    answer.message = fmt::format("{} points in {}", points, path).c_str();
+    answer.message = std::string_view(fmt::format("{} points in {}", points, path));
   } catch (const lab::OutputError& error) {
     answer.success = 0;
     answer.message = error.what();
@@ -168,7 +168,7 @@ bool Node::reset(TriggerAnswer& answer) {
 bool Node::pause(Sensor sensor, bool paused, SetBoolAnswer& answer) {
   inputs_->pause(sensor, paused);
   answer.success = 1;
-  answer.message = fmt::format("{} {}", name_of(sensor), paused ? "is left out" : "is used again").c_str();
+  answer.message = std::string_view(fmt::format("{} {}", name_of(sensor), paused ? "is left out" : "is used again"));
   ROS_INFO_STREAM("kilvo: " << answer.message.c_str());
   return true;
 }

@@ -29,13 +29,13 @@ void copy_into(Quaternion& to, const Eigen::Quaterniond& from) {
 template <class Header>
 void address(Header& header, Time t, const std::string& frame) {
   header.stamp = ros_time(t);
-  header.frame_id = frame.c_str();
+  header.frame_id = std::string_view(frame);
 }
 
 TransformStamped transform(const SE3& T, Time t, const std::string& parent, const std::string& child) {
   TransformStamped out;
   address(out.header, t, parent);
-  out.child_frame_id = child.c_str();
+  out.child_frame_id = std::string_view(child);
   copy_into(out.transform.translation, T.p);
   copy_into(out.transform.rotation, T.R.quaternion());
   return out;
@@ -85,11 +85,11 @@ void StateOutlet::note(const Output& output, const BodyMotion& best) {
   ++newest_->outputs;
 }
 
-void StateOutlet::publish(ros::Publisher& publisher, const BodyMotion& motion, Time t, const std::string& frame) {
+void StateOutlet::publish(const ros::Publisher& publisher, const BodyMotion& motion, Time t, const std::string& frame) const {
   if (publisher.getNumSubscribers() == 0) return;
   OdometryMessage message;
   address(message.header, t, frame);
-  message.child_frame_id = names_.base_frame.c_str();
+  message.child_frame_id = std::string_view(names_.base_frame);
   copy_into(message.pose.pose.position, motion.pose.p);
   copy_into(message.pose.pose.orientation, motion.pose.R.quaternion());
   copy_into(message.twist.twist.linear, motion.v_B);
@@ -119,7 +119,7 @@ void StateOutlet::publish_contacts(const Contacts& contacts) {
   JointMessage message;
   address(message.header, contacts.t, names_.map_frame);
   for (std::size_t side = 0; side < feet_.size(); ++side) {
-    message.name.emplace_back(feet_[side].c_str());
+    message.name.emplace_back(std::string_view(feet_[side]));
     message.position.push_back(contacts.clearance[side]);
     message.velocity.push_back(contacts.d_fv[side]);
     message.effort.push_back(contacts.on[side] ? 1 : 0);

@@ -41,7 +41,7 @@ class StateOutlet {
 
  private:
   void note(const Output& output, const BodyMotion& best);
-  void publish(ros::Publisher& publisher, const BodyMotion& motion, Time t, const std::string& frame);
+  void publish(const ros::Publisher& publisher, const BodyMotion& motion, Time t, const std::string& frame) const;
   void publish_transforms(const BodyMotion& best, const BodyMotion& smooth, Time t);
   void publish_contacts(const Contacts& contacts);
   void extend_path(const BodyMotion& best, Time t);
