@@ -5,6 +5,7 @@
 
 #include "lab/messages/input_error.hpp"
 #include "lab/messages/message_decoder.hpp"
+#include "lab/messages/point_time_search.hpp"
 #include "lab/recordings/recording_file.hpp"
 
 namespace kilvo::lab {
@@ -15,29 +16,20 @@ constexpr double for_ever = 1e9;
 
 Time after(Time begin, double seconds) { return seconds < for_ever ? begin + from_seconds(std::max(seconds, 0.0)) : Time::max(); }
 
-Time& stamp_in(Measurement& measurement) {
-  return std::visit([](auto& m) -> Time& { return m.t; }, measurement);
-}
-
 std::string plural(std::uint64_t count, const std::string& what) { return std::to_string(count) + " " + what + (count == 1 ? "" : "s"); }
 
 }  // namespace
 
 std::optional<PointTimeFormat> find_point_time(Rosbag1Reader& reader, const ChosenTopic& lidar, double nominal_rate) {
   reader.select([&](const BagConnection& c) { return c.topic == lidar.topic && c.type == lidar.type; });
-  std::vector<CloudTimes> full, small;
-  while (full.size() < clouds_to_look_at) {
+  PointTimeSearch search(lidar.type, nominal_rate);
+  while (!search.has_enough()) {
     const auto message = reader.next();
     if (!message) break;
-    auto times = observe_cloud(lidar.type, message->bytes);
-    if (!times) continue;
-    const bool is_full = times->points > points_of_a_full_cloud;
-    if (is_full || (times->points > 1 && small.size() < clouds_to_look_at)) (is_full ? full : small).push_back(*std::move(times));
+    search.look_at(message->bytes);
   }
-  const auto& clouds = full.empty() ? small : full;
-  if (clouds.empty()) return std::nullopt;
-  const Duration period = from_seconds(nominal_rate > 0 ? 1 / nominal_rate : 0.1);
-  auto format = detect_point_time_of(lidar.type, clouds, period);
+  if (!search.has_any()) return std::nullopt;
+  auto format = search.decide();
   if (!format) throw InputError(lidar.topic + ": " + format.reason() + "; --no-deskew takes each cloud at its stamp");
   return *std::move(format);
 }
@@ -47,6 +39,7 @@ RecordingSource::RecordingSource(const std::filesystem::path& input, RecordingOp
   for (int i = 0; i < sensor_count; ++i) {
     const auto sensor = static_cast<Sensor>(i);
     if (!options_[sensor].use) continue;
+    intakes_[static_cast<std::size_t>(i)] = SensorIntake(options_[sensor].time_offset);
     try {
       chosen_[static_cast<std::size_t>(i)] = choose_topic(reader_.connections(), sensor, options_[sensor].topic);
     } catch (const InputError& error) {
@@ -65,28 +58,10 @@ RecordingSource::RecordingSource(const std::filesystem::path& input, RecordingOp
 }
 
 std::optional<Measurement> RecordingSource::decode(Sensor sensor, const RawMessage& message) {
-  SensorCounts& counts = counts_[static_cast<std::size_t>(sensor)];
-  if (message.size > most_message_bytes) {
-    ++counts.dropped["too_large"];
-    return std::nullopt;
-  }
-  auto decoded = decode_measurement(message.connection->type, message.bytes, point_time_);
-  if (!decoded) {
-    auto& first = first_fault_[static_cast<std::size_t>(sensor)];
-    if (first.empty()) first = decoded.reason();
-    ++counts.dropped["undecodable"];
-    return std::nullopt;
-  }
-  ++counts.used;
-  counts.absurd_point_times += decoded->absurd_times;
-  Time& stamp = stamp_in(decoded->measurement);
-  if (stamp == Time{}) {
-    // A driver that does not stamp, as some do not their joints: the time of arrival is the best there is.
-    stamp = message.time;
-    ++counts.unstamped;
-  }
-  stamp += from_seconds(options_[sensor].time_offset);
-  return std::move(decoded->measurement);
+  SensorIntake& intake = intakes_[static_cast<std::size_t>(sensor)];
+  if (message.size <= most_message_bytes) return intake.take(message.connection->type, message.bytes, message.time, point_time_);
+  intake.refuse_too_large();
+  return std::nullopt;
 }
 
 std::optional<Measurement> RecordingSource::next() {
@@ -109,11 +84,12 @@ std::vector<std::string> RecordingSource::warnings() const {
   }
   for (std::size_t i = 0; i < sensor_count; ++i) {
     const std::string& topic = chosen_[i].topic;
-    const auto& counts = counts_[i];
+    const auto& counts = intakes_[i].counts();
     if (topic.empty()) continue;
     if (counts.used == 0 && counts.dropped.empty()) texts.push_back(topic + ": no messages");
     if (counts.dropped.contains("undecodable")) {
-      texts.push_back(topic + ": " + plural(counts.dropped.at("undecodable"), "message") + " not decodable; the first: " + first_fault_[i]);
+      texts.push_back(topic + ": " + plural(counts.dropped.at("undecodable"), "message") +
+                      " not decodable; the first: " + intakes_[i].first_fault());
     }
     if (counts.dropped.contains("too_large")) {
       texts.push_back(topic + ": " + plural(counts.dropped.at("too_large"), "message") + " of more than " +

@@ -11,6 +11,7 @@
 
 #include "kilvo/sensors/measurement_source.hpp"
 #include "lab/messages/point_time.hpp"
+#include "lab/messages/sensor_intake.hpp"
 #include "lab/recordings/rosbag1_reader.hpp"
 #include "lab/recordings/topic_choice.hpp"
 
@@ -34,14 +35,6 @@ struct RecordingOptions {
   const SensorInput& operator[](Sensor s) const { return sensors[static_cast<std::size_t>(s)]; }
 };
 
-/// What became of the messages of one sensor within [start, start + duration).
-struct SensorCounts {
-  std::uint64_t used = 0;
-  std::map<std::string, std::uint64_t> dropped;  // cause -> messages: "undecodable", "too_large"
-  std::uint64_t absurd_point_times = 0;          // points, not messages: dropped from their clouds
-  std::uint64_t unstamped = 0;                   // used, with the time of their recording because their stamp is 0
-};
-
 class RecordingSource final : public MeasurementSource {
  public:
   /// Throws InputError: no such recording, a used sensor without a topic or with one of a wrong type, clouds without point times.
@@ -62,7 +55,8 @@ class RecordingSource final : public MeasurementSource {
   /// How the points' times were found to be written, for the user to read.
   const PointTimeFormat& point_time() const { return point_time_; }
 
-  const SensorCounts& counts(Sensor s) const { return counts_[static_cast<std::size_t>(s)]; }
+  /// Of the messages within [start, start + duration).
+  const SensorCounts& counts(Sensor s) const { return intakes_[static_cast<std::size_t>(s)].counts(); }
   bool input_damaged() const { return reader_.damage().has_value(); }
   std::optional<Damage> damage() const { return reader_.damage(); }
   /// What the user should know, one sentence each; complete when next() has given nothing.
@@ -75,8 +69,7 @@ class RecordingSource final : public MeasurementSource {
   RecordingOptions options_;
   std::array<ChosenTopic, sensor_count> chosen_;
   PointTimeFormat point_time_;
-  std::array<SensorCounts, sensor_count> counts_;
-  std::array<std::string, sensor_count> first_fault_;  // why the first undecodable message was
+  std::array<SensorIntake, sensor_count> intakes_;
   Time recorded_{};
 };
 

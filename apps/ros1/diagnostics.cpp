@@ -1,0 +1,126 @@
+#include "apps/ros1/diagnostics.hpp"
+
+#include <algorithm>
+#include <fmt/core.h>
+
+namespace kilvo::ros1 {
+namespace {
+
+// By the clock on the wall: three messages in a row, but no less than a machine may be busy.
+constexpr double least_silence = 0.2, periods_of_silence = 3;  // s, -
+
+void add(DiagnosticStatus& status, const std::string& key, const std::string& value) {
+  DiagnosticValue entry;
+  entry.key = std::string_view(key);
+  entry.value = std::string_view(value);
+  status.values.push_back(entry);
+}
+
+DiagnosticStatus named(const std::string& name) {
+  DiagnosticStatus out;
+  out.name = std::string_view("kilvo: " + name);
+  out.hardware_id = "kilvo";
+  return out;
+}
+
+void say(DiagnosticStatus& status, std::uint8_t level, const std::string& text) {
+  status.level = static_cast<decltype(status.level)>(level);
+  status.message = std::string_view(text);
+}
+
+/// The level and the reason; nothing when the sensor is well.
+struct Trouble {
+  std::uint8_t level;
+  std::string text;
+};
+
+std::optional<Trouble> trouble_of(Sensor sensor, const Condition& c) {
+  const auto s = static_cast<std::size_t>(sensor);
+  const InputState& input = c.inputs[s];
+  if (input.paused) return Trouble{DiagnosticStatus::WARN, fmt::format("lost: paused by ~pause/{}", name_of(sensor))};
+  if (!input.last) return Trouble{DiagnosticStatus::ERROR, "lost: no message on " + input.topic + " yet"};
+  if (const auto silent = silence_of(input, c.rates[s], c.now))
+    return Trouble{DiagnosticStatus::ERROR, fmt::format("lost: no message on {} for {:.1f} s", input.topic, *silent)};
+  if (sensor == Sensor::legs && !c.legs_mismatch.empty()) return Trouble{DiagnosticStatus::ERROR, "lost: " + c.legs_mismatch};
+  if (!input.fault.empty()) return Trouble{DiagnosticStatus::ERROR, fmt::format("lost: {}: {}", input.topic, input.fault)};
+  return std::nullopt;
+}
+
+DiagnosticStatus status_of(Sensor sensor, const Condition& c) {
+  const auto s = static_cast<std::size_t>(sensor);
+  const InputState& input = c.inputs[s];
+  DiagnosticStatus out = named(name_of(sensor));
+  const Trouble trouble = trouble_of(sensor, c).value_or(Trouble{DiagnosticStatus::OK, "ok"});
+  say(out, trouble.level, trouble.text);
+  add(out, "topic", input.topic);
+  add(out, "messages", std::to_string(input.messages));
+  for (const auto& [cause, count] : input.counts.dropped) add(out, "dropped: " + cause, std::to_string(count));
+  if (input.counts.unstamped > 0) add(out, "without a stamp", std::to_string(input.counts.unstamped));
+  const SensorCount& seen = c.seen.sensors[s];
+  add(out, "used", std::to_string(seen.used));
+  for (const auto& [cause, count] : seen.dropped) add(out, "dropped: " + cause, std::to_string(count));
+  const StreamHealth& health = c.seen.health[s];
+  add(out, "mean interval (s)", fmt::format("{:.5f}", health.mean_interval));
+  add(out, "jitter (s)", fmt::format("{:.5f}", health.jitter));
+  add(out, "longest gap (s)", fmt::format("{:.3f}", health.longest_gap));
+  if (health.frozen > 0) add(out, "times frozen", std::to_string(health.frozen));
+  if (health.clipped > 0) add(out, "clipped samples", std::to_string(health.clipped));
+  if (health.off_clock > 0) add(out, "stamped ahead of the IMU", std::to_string(health.off_clock));
+  return out;
+}
+
+DiagnosticStatus status_of_estimate(const Condition& c) {
+  DiagnosticStatus out = named("estimator");
+  if (!c.estimate) {
+    say(out, DiagnosticStatus::WARN, c.waiting_for.empty() ? "waiting for the first output" : c.waiting_for);
+    return out;
+  }
+  std::string lost;
+  for (int i = 0; i < sensor_count; ++i) {
+    const auto sensor = static_cast<Sensor>(i);
+    if (!c.inputs[static_cast<std::size_t>(i)].topic.empty() && trouble_of(sensor, c))
+      lost += (lost.empty() ? "" : ", ") + std::string(name_of(sensor));
+  }
+  const EstimateState& e = *c.estimate;
+  std::uint8_t level = lost.empty() ? DiagnosticStatus::OK : DiagnosticStatus::WARN;
+  if (e.modality == Modality::coast || c.seen.diverged || trouble_of(Sensor::imu, c)) level = DiagnosticStatus::ERROR;
+  std::string text = fmt::format("{} ({})", name_of(e.modality), e.cause);
+  if (!lost.empty()) text += ", lost: " + lost;
+  if (c.seen.diverged) text += ", diverged";
+  say(out, level, text);
+  add(out, "modality", name_of(e.modality));
+  add(out, "cause", e.cause);
+  add(out, "lost", lost.empty() ? "none" : lost);
+  add(out, "outputs", std::to_string(e.outputs));
+  add(out, "position, one sigma (m)", fmt::format("{:.4f}", std::sqrt(std::max(0.0, e.position_covariance.trace()))));
+  add(out, "IMU outages", std::to_string(c.seen.imu_outages));
+  add(out, "states thrown away", std::to_string(c.seen.rollbacks));
+  add(out, "sweeps not mapped in time", std::to_string(c.clouds_given_up));
+  for (const std::string& warning : c.seen.warnings) add(out, "warning", warning);
+  return out;
+}
+
+}  // namespace
+
+std::optional<double> silence_of(const InputState& input, double rate, SteadyClock::time_point now) {
+  if (!input.last) return std::nullopt;
+  const double silent = std::chrono::duration<double>(now - *input.last).count();
+  const double limit = std::max(least_silence, rate > 0 ? periods_of_silence / rate : 0);
+  return silent > limit ? std::optional(silent) : std::nullopt;
+}
+
+std::vector<DiagnosticStatus> statuses(const Condition& condition) {
+  std::vector<DiagnosticStatus> out = {status_of_estimate(condition)};
+  for (int i = 0; i < sensor_count; ++i) {
+    if (!condition.inputs[static_cast<std::size_t>(i)].topic.empty()) out.push_back(status_of(static_cast<Sensor>(i), condition));
+  }
+  return out;
+}
+
+std::string essence(const std::vector<DiagnosticStatus>& statuses) {
+  std::string out;
+  for (const DiagnosticStatus& status : statuses) out += std::to_string(status.level);
+  return out + statuses.front().message.c_str();
+}
+
+}  // namespace kilvo::ros1

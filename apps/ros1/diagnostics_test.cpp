@@ -1,0 +1,95 @@
+#include "apps/ros1/diagnostics.hpp"
+
+#include <cstring>
+#include <gtest/gtest.h>
+
+#include "apps/ros1/clouds.hpp"
+
+namespace kilvo::ros1 {
+namespace {
+
+using std::chrono::milliseconds;
+
+// All four sensors at their usual rates, all well.
+Condition all_is_well() {
+  Condition c;
+  c.now = SteadyClock::time_point(std::chrono::seconds(100));
+  c.rates = {200, 1000, 10, 10};
+  for (std::size_t s = 0; s < sensor_count; ++s) {
+    c.inputs[s].topic = std::string("/") + name_of(static_cast<Sensor>(s));
+    c.inputs[s].last = c.now - milliseconds(50);
+  }
+  c.estimate.emplace();
+  c.estimate->modality = Modality::kilv;
+  return c;
+}
+
+std::string message_of(const std::vector<DiagnosticStatus>& all, const std::string& name) {
+  for (const DiagnosticStatus& status : all) {
+    if (name == status.name.c_str()) return status.message.c_str();
+  }
+  return "no status of this name";
+}
+
+TEST(Diagnostics, AreOkWhenAllIsWell) {
+  const auto all = statuses(all_is_well());
+  ASSERT_EQ(all.size(), 5u);
+  for (const DiagnosticStatus& status : all) EXPECT_EQ(+status.level, +DiagnosticStatus::OK) << status.name << status.message;
+}
+
+TEST(Diagnostics, NameEachLostSensorWithinHalfASecond) {
+  for (std::size_t s = 0; s < sensor_count; ++s) {
+    Condition c = all_is_well();
+    const std::string name = name_of(static_cast<Sensor>(s));
+    c.inputs[s].last = c.now - milliseconds(400);
+    const auto all = statuses(c);
+    EXPECT_EQ(message_of(all, "kilvo: " + name), "lost: no message on /" + name + " for 0.4 s");
+    EXPECT_NE(message_of(all, "kilvo: estimator").find("lost: " + name), std::string::npos);
+    EXPECT_NE(essence(all), essence(statuses(all_is_well()))) << "told at once";
+    EXPECT_EQ(all.front().level == DiagnosticStatus::ERROR, name == "imu") << "without the IMU there is no estimate";
+  }
+}
+
+TEST(Diagnostics, SayWhyASensorIsNotUsed) {
+  Condition c = all_is_well();
+  c.inputs[0].last.reset();
+  c.inputs[1].paused = true;
+  c.inputs[2].fault = "no point times";
+  auto all = statuses(c);
+  EXPECT_EQ(message_of(all, "kilvo: imu"), "lost: no message on /imu yet");
+  EXPECT_EQ(message_of(all, "kilvo: legs"), "lost: paused by ~pause/legs");
+  EXPECT_EQ(message_of(all, "kilvo: lidar"), "lost: /lidar: no point times");
+  c.inputs[1].paused = false;
+  c.legs_mismatch = "no joint left_knee";
+  EXPECT_EQ(message_of(statuses(c), "kilvo: legs"), "lost: no joint left_knee");
+}
+
+TEST(Diagnostics, TellWhatTheStartWaitsFor) {
+  Condition c = all_is_well();
+  c.estimate.reset();
+  c.waiting_for = "waiting for the robot to stand still";
+  EXPECT_EQ(message_of(statuses(c), "kilvo: estimator"), c.waiting_for);
+}
+
+TEST(Diagnostics, ASensorThatTheRobotDoesNotHaveIsNotSpokenOf) {
+  Condition c = all_is_well();
+  c.inputs[3] = {};
+  EXPECT_EQ(message_of(statuses(c), "kilvo: camera"), "no status of this name");
+  EXPECT_EQ(+statuses(c).front().level, +DiagnosticStatus::OK);
+}
+
+TEST(Clouds, ColoursArePackedAsRvizReadsThem) {
+  const std::vector<ColouredPoint> points = {{{1, 2, 3}, {0x11, 0x22, 0x33}, 1}};
+  const CloudMessage cloud = cloud_message(points, time_from_ns(1'500'000'000), "map");
+  EXPECT_EQ(cloud.header.stamp, ros::Time(1, 500'000'000));
+  ASSERT_EQ(cloud.data.size(), 16u);
+  float z = 0;
+  std::memcpy(&z, cloud.data.data() + 8, sizeof z);
+  EXPECT_EQ(z, 3);
+  EXPECT_EQ(cloud.data[12], 0x33);
+  EXPECT_EQ(cloud.data[13], 0x22);
+  EXPECT_EQ(cloud.data[14], 0x11);
+}
+
+}  // namespace
+}  // namespace kilvo::ros1

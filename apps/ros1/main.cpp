@@ -1,0 +1,142 @@
+// kilvo_node: KILVO for ROS 1.
+#include <charconv>
+#include <csignal>
+#include <ctime>
+#include <exception>
+#include <fmt/core.h>
+#include <ros/init.h>
+#include <ros/master.h>
+#include <ros/node_handle.h>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "apps/ros1/node.hpp"
+
+namespace {
+
+using namespace kilvo;
+
+enum ExitCode : int { done = 0, run_failed = 1, wrong_usage = 2 };
+
+/// SIGINT and SIGTERM as a question that the main thread asks. Made before any other thread, so that none of them takes the signal.
+class StopSignals {
+ public:
+  StopSignals() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+  }
+  /// Waits for one, or for so long, ns below a second.
+  bool came_within(long nanoseconds) const {
+    const timespec time{0, nanoseconds};
+    return sigtimedwait(&signals_, nullptr, &time) >= 0;
+  }
+
+ private:
+  sigset_t signals_{};
+};
+
+/// The command line, without the parameters on it: with these ros::init would wait for a master, deaf to signals.
+class CommandLine {
+ public:
+  CommandLine(int argc, char** argv) : words_(argv, argv + argc) {
+    std::erase_if(words_, [this](const char* word) {
+      const std::string_view text = word;
+      const std::size_t sign = text.find(":=");
+      const bool is_parameter = sign != std::string_view::npos && text.starts_with('_') && !text.starts_with("__");
+      if (is_parameter) parameters_.emplace_back(text.substr(1, sign - 1), text.substr(sign + 2));
+      return is_parameter;
+    });
+  }
+
+  /// Throws ParameterError when there is something that ROS does not understand either.
+  void init_ros() {
+    int argc = static_cast<int>(words_.size());
+    words_.push_back(nullptr);
+    ros::init(argc, words_.data(), "kilvo", ros::init_options::NoSigintHandler);
+    if (argc > 1)
+      throw ros1::ParameterError(
+          fmt::format("'{}' is not understood: parameters are given as _config:=FILE, or by a launch file", words_[1]));
+  }
+
+  /// As ros::init would have done it.
+  void set_parameters(const ros::NodeHandle& own) const {
+    for (const auto& [name, value] : parameters_) {
+      double number = 0;
+      const char* end = value.data() + value.size();
+      const auto [rest, error] = std::from_chars(value.data(), end, number);
+      if (value == "true" || value == "false") {
+        own.setParam(name, value == "true");
+      } else if (error == std::errc() && rest == end) {
+        own.setParam(name, number);
+      } else {
+        own.setParam(name, value);
+      }
+    }
+  }
+
+ private:
+  std::vector<char*> words_;
+  std::vector<std::pair<std::string, std::string>> parameters_;
+};
+
+// Without a master there are no parameters to read.
+bool wait_for_master(const StopSignals& stop) {
+  constexpr int tries_a_message = 50;
+  for (int tried = 0; !ros::master::check(); ++tried) {
+    if (tried % tries_a_message == 0)
+      fmt::print(stderr, "kilvo_node: waiting for a ROS master at {} (is roscore running?)\n", ros::master::getURI());
+    if (stop.came_within(200'000'000)) return false;
+  }
+  return true;
+}
+
+lab::Settings load(const ros1::Parameters& parameters) {
+  lab::Settings settings = lab::load_settings(parameters.config, parameters.overrides);
+  std::vector<Sensor> used;
+  for (int i = 0; i < sensor_count; ++i) {
+    if (settings.has(static_cast<Sensor>(i))) used.push_back(static_cast<Sensor>(i));
+  }
+  if (used.empty() || used.front() != Sensor::imu)
+    throw lab::ConfigError(parameters.config + ": imu.topic is missing: nothing is estimated without the IMU");
+  lab::require_complete(settings, used);
+  // As `kilvo run --realtime`: on a robot the other cores are for others.
+  if (!settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
+  if (!settings.given.contains("estimator.threads")) settings.estimator.threads = 1;
+  return settings;
+}
+
+int run(int argc, char** argv) {
+  const StopSignals stop;
+  CommandLine words(argc, argv);
+  words.init_ros();
+  if (!wait_for_master(stop)) return done;
+  ros::NodeHandle node, own("~");
+  words.set_parameters(own);
+  const ros1::Parameters parameters = ros1::read_parameters(own);
+  {
+    ros1::Node kilvo(parameters, load(parameters));
+    while (ros::ok() && !stop.came_within(100'000'000)) kilvo.tick();
+  }
+  ros::shutdown();
+  return done;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const kilvo::ros1::ParameterError& error) {
+    fmt::print(stderr, "kilvo_node: {}\n", error.what());
+    return wrong_usage;
+  } catch (const kilvo::lab::ConfigError& error) {
+    fmt::print(stderr, "kilvo_node: {}\n", error.what());
+    return wrong_usage;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "kilvo_node: {}\n", error.what());
+    return run_failed;
+  }
+}

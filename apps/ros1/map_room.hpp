@@ -1,0 +1,55 @@
+// What takes time and nobody waits for: sweeps and images become clouds for others and the map that is saved, on a thread of its own.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <ros/node_handle.h>
+#include <string>
+#include <thread>
+
+#include "apps/ros1/parameters.hpp"
+#include "kilvo/estimator/output.hpp"
+#include "lab/mapping/map_builder.hpp"
+
+namespace kilvo::ros1 {
+
+class MapRoom {
+ public:
+  MapRoom(const Names& names, const lab::MappingConfig& config);
+  ~MapRoom();
+  MapRoom(const MapRoom&) = delete;
+  MapRoom& operator=(const MapRoom&) = delete;
+
+  /// An output of a sweep or an image. Never waits; the oldest are given up when too many wait.
+  void take(Output output);
+
+  /// Writes the map of all sweeps until now; how many points it has. Throws lab::OutputError.
+  std::size_t save(const std::string& path);
+
+  /// Begins an empty map.
+  void clear();
+
+  std::uint64_t given_up() const;
+
+ private:
+  void run();
+  void put(const Output& output);
+
+  lab::MappingConfig config_;
+  std::string frame_;
+  ros::Publisher cloud_, coloured_;
+
+  mutable std::mutex waiting_mutex_;
+  std::condition_variable news_;
+  std::deque<Output> waiting_;
+  std::uint64_t given_up_ = 0;
+  bool ended_ = false;
+
+  std::mutex map_mutex_;
+  lab::MapBuilder map_;
+  std::thread thread_;  // last: it uses all of the above
+};
+
+}  // namespace kilvo::ros1

@@ -1,0 +1,33 @@
+#include "lab/messages/sensor_intake.hpp"
+
+#include "lab/messages/message_decoder.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+Time& stamp_in(Measurement& measurement) {
+  return std::visit([](auto& m) -> Time& { return m.t; }, measurement);
+}
+
+}  // namespace
+
+std::optional<Measurement> SensorIntake::take(std::string_view ros_type, Bytes message, Time arrived, const PointTimeFormat& point_time) {
+  auto decoded = decode_measurement(ros_type, message, point_time);
+  if (!decoded) {
+    if (first_fault_.empty()) first_fault_ = decoded.reason();
+    ++counts_.dropped["undecodable"];
+    return std::nullopt;
+  }
+  ++counts_.used;
+  counts_.absurd_point_times += decoded->absurd_times;
+  Time& stamp = stamp_in(decoded->measurement);
+  if (stamp == Time{}) {
+    // A driver that does not stamp, as some do not their joints: the time of arrival is the best there is.
+    stamp = arrived;
+    ++counts_.unstamped;
+  }
+  stamp += from_seconds(time_offset_);
+  return std::move(decoded->measurement);
+}
+
+}  // namespace kilvo::lab

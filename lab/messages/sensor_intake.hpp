@@ -1,0 +1,44 @@
+// The messages of one sensor, from bytes to measurements, and what became of each.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "kilvo/sensors/measurement.hpp"
+#include "lab/messages/bytes.hpp"
+#include "lab/messages/point_time.hpp"
+
+namespace kilvo::lab {
+
+/// What became of the messages of one sensor.
+struct SensorCounts {
+  std::uint64_t used = 0;
+  std::map<std::string, std::uint64_t> dropped;  // cause -> messages: "undecodable", "too_large"
+  std::uint64_t absurd_point_times = 0;          // points, not messages: dropped from their clouds
+  std::uint64_t unstamped = 0;                   // used, with the time of their arrival because their stamp is 0
+};
+
+class SensorIntake {
+ public:
+  /// `time_offset`: s, added to the stamps (of a scan: to the time that its points count from).
+  explicit SensorIntake(double time_offset = 0) : time_offset_(time_offset) {}
+
+  /// `arrived`: when the message was recorded, or received. `point_time` matters for LiDAR types only.
+  std::optional<Measurement> take(std::string_view ros_type, Bytes message, Time arrived, const PointTimeFormat& point_time);
+  /// A message was too large to be looked at.
+  void refuse_too_large() { ++counts_.dropped["too_large"]; }
+
+  const SensorCounts& counts() const { return counts_; }
+  /// Why the first undecodable message was; empty without one.
+  const std::string& first_fault() const { return first_fault_; }
+
+ private:
+  double time_offset_;
+  SensorCounts counts_;
+  std::string first_fault_;
+};
+
+}  // namespace kilvo::lab
