@@ -11,7 +11,8 @@ bool Pace::wait_for(Time arrived, InterruptWatch& interrupt) {
     first_ = arrived;
     begin_ = Clock::now();
   }
-  const auto due = begin_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(to_seconds(arrived - *first_) / speed_));
+  const auto due =
+      begin_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(to_seconds(arrived - *first_) / speed_));
   while (!interrupt.requested()) {
     const auto now = Clock::now();
     if (now >= due) return true;

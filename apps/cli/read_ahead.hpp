@@ -13,8 +13,8 @@ namespace kilvo::cli {
 
 class ReadAhead {
  public:
-  /// `progress`: how far the source is, 0 to 1; `arrival`: when what it gave last arrived. Without a thread of its own, `threaded` false, it just asks the source. The source must not
-  /// be touched before stop().
+  /// `progress`: how far the source is, 0 to 1; `arrival`: when what it gave last arrived. Without a thread of its own, `threaded` false,
+  /// it just asks the source. The source must not be touched before stop().
   ReadAhead(MeasurementSource& source, std::function<double()> progress, std::function<Time()> arrival, bool threaded);
   ~ReadAhead() { stop(); }
   ReadAhead(const ReadAhead&) = delete;

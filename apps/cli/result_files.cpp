@@ -70,7 +70,8 @@ void ResultFiles::write_contacts(const Output& output) {
 // Sweeps and images have a row each; what the other says is left empty.
 void ResultFiles::write_indicators(const Output& output) {
   if (output.indicators.empty()) return;
-  if (!degradation_) degradation_.emplace(folder_ / "degradation.csv", "t,lidar_ratio,lidar_weak,visual_points,lidar_degraded,visual_degraded");
+  if (!degradation_)
+    degradation_.emplace(folder_ / "degradation.csv", "t,lidar_ratio,lidar_weak,visual_points,lidar_degraded,visual_degraded");
   std::string line, ratio, share, points;
   bool lidar = false, visual = false;
   for (const Indicator& i : output.indicators) {

@@ -114,7 +114,8 @@ void add_live(Json& json, const RunFacts& facts) {
   json["queue_drops"] = drops;
   json["queue_depth"] = live.deepest;
   Json cpu = Json::object();
-  for (const auto& [thread, seconds] : live.cpu_seconds) cpu[thread] = facts.wall_seconds > 0 ? tenths(100 * seconds / facts.wall_seconds) : 0;
+  for (const auto& [thread, seconds] : live.cpu_seconds)
+    cpu[thread] = facts.wall_seconds > 0 ? tenths(100 * seconds / facts.wall_seconds) : 0;
   json["cpu_percent"] = cpu;
 }
 

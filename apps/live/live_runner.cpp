@@ -1,8 +1,8 @@
 #include "apps/live/live_runner.hpp"
 
-#include <algorithm>
 #include <utility>
 
+#include "apps/live/raw.hpp"
 #include "apps/live/thread_settings.hpp"
 #include "kilvo/estimator/fault.hpp"
 #include "kilvo/estimator/stopwatch.hpp"
@@ -10,18 +10,10 @@
 namespace kilvo::live {
 namespace {
 
-constexpr std::size_t most_samples = 4096, most_outputs = 4096, most_slow_outputs = 64, most_raw = 8192;
-constexpr double deadline = 1e-3;  // s
+constexpr std::size_t most_samples = 4096, most_outputs = 4096, most_slow_outputs = 64;
 // Without sweeps and images, a fork so often; what the user is told, so often.
 constexpr Duration fork_period = std::chrono::milliseconds(100);
 constexpr auto tell_period = std::chrono::milliseconds(500);
-
-double seconds_since(Clock::time_point then) { return std::chrono::duration<double>(Clock::now() - then).count(); }
-
-template <class Raw>
-Time stamp_of_raw(const Raw& raw) {
-  return std::visit([](const auto& s) { return s.t; }, raw);
-}
 
 }  // namespace
 
@@ -115,82 +107,6 @@ void LiveRunner::warn(const std::string& text) {
   statistics_.warnings.push_back("live: " + text);
 }
 
-// ---- the fast thread: nothing here waits for another thread, or allocates
-
-void LiveRunner::run_fast() {
-  warn(settle_thread({"kilvo-fast", config_.priority, config_.fast_core}));
-  std::size_t deepest = 0;
-  bool ended = false;
-  while (!ended) {
-    for_fast_.wait();
-    ended = slow_ended_;
-    take_over();
-    deepest = std::max(deepest, samples_.size());
-    while (const Sample* sample = samples_.front()) {
-      take(*sample);
-      samples_.pop();
-      take_over();
-    }
-  }
-  const std::lock_guard lock(seen_mutex_);
-  statistics_.deepest["fast"] = deepest;
-  statistics_.cpu_seconds["fast"] = thread_cpu_seconds();
-}
-
-void LiveRunner::take(const Sample& sample) {
-  if (fast_raw_.size() >= most_raw) fast_raw_.pop_front();
-  Forerunner& runner = forks_.front().runner;
-  if (sample.is_imu) {
-    fast_raw_.push_back(sample.imu);
-    if (runner.push(sample.imu)) emit(sample.at);
-    return;
-  }
-  // Behind by so much, nobody waits for the answer any more.
-  if (seconds_since(sample.at) > config_.max_latency) {
-    ++statistics_.dropped[static_cast<std::size_t>(Sensor::legs)];
-    return;
-  }
-  if (fault_of(sample.joints) != nullptr) return;
-  const auto known = fast_kinematics_->feet(sample.joints);
-  const auto* feet = std::get_if<Feet>(&known);
-  if (feet == nullptr) return;
-  fast_raw_.push_back(*feet);
-  if (runner.push(*feet)) emit(sample.at);
-}
-
-// The estimator's newest state, with what came since.
-void LiveRunner::take_over() {
-  if (!forks_.fetch()) return;
-  Fork& fork = forks_.front();
-  const Time known = fork.runner.known();
-  while (!fast_raw_.empty() && stamp_of_raw(*fast_raw_.begin()) < known) fast_raw_.pop_front();
-  for (const Raw& raw : fast_raw_) std::visit([&](const auto& s) { fork.runner.push(s); }, raw);
-  if (fork.corrected) statistics_.correction.add(seconds_since(*fork.corrected));
-  // That there is no pose any more is said once.
-  if (fork.runner.imu_lost() && !std::exchange(lost_, true)) emit(Clock::now());
-  lost_ = fork.runner.imu_lost();
-}
-
-void LiveRunner::emit(Clock::time_point since) {
-  Output output = forks_.front().runner.output();
-  if (last_output_ && output.t <= *last_output_) {
-    if (!lost_) return;
-    output.t = *last_output_ + Duration(1000);
-  }
-  last_output_ = output.t;
-  if (Output* slot = outputs_.vacant()) {
-    *slot = std::move(output);
-    outputs_.push();
-    for_output_.post();
-  } else {
-    ++statistics_.dropped_outputs;
-  }
-  if (lost_) return;
-  const double latency = seconds_since(since);
-  statistics_.latency.add(latency);
-  if (latency > deadline) ++statistics_.deadline_misses;
-}
-
 // ---- the slow thread
 
 void LiveRunner::run_slow() {
@@ -226,12 +142,11 @@ void LiveRunner::answer(std::vector<Output>& outputs, Clock::time_point since) {
 }
 
 void LiveRunner::keep_raw(const Measurement& m) {
-  if (slow_raw_.size() >= most_raw) slow_raw_.pop_front();
-  if (const auto* imu = std::get_if<ImuSample>(&m)) slow_raw_.push_back(*imu);
+  if (const auto* imu = std::get_if<ImuSample>(&m)) keep(*imu, slow_raw_);
   const auto* joints = std::get_if<JointSample>(&m);
   if (joints == nullptr || !slow_kinematics_ || fault_of(*joints) != nullptr) return;
   const auto known = slow_kinematics_->feet(*joints);
-  if (const auto* feet = std::get_if<Feet>(&known)) slow_raw_.push_back(*feet);
+  if (const auto* feet = std::get_if<Feet>(&known)) keep(*feet, slow_raw_);
 }
 
 // Sweeps and images; the states in between are the fast thread's. True when there was one.
@@ -256,9 +171,7 @@ void LiveRunner::hand_over(std::optional<Clock::time_point> corrected) {
   Fork& fork = forks_.back();
   if (!estimator_.fork(fork.runner)) return;
   fork.corrected = corrected;
-  const Time known = fork.runner.known();
-  while (!slow_raw_.empty() && stamp_of_raw(*slow_raw_.begin()) < known) slow_raw_.pop_front();
-  for (const Raw& raw : slow_raw_) std::visit([&](const auto& s) { fork.runner.push(s); }, raw);
+  catch_up(fork.runner, slow_raw_);
   forks_.publish();
   for_fast_.post();
 }

@@ -1,5 +1,6 @@
 // The estimator on a robot. A fast thread answers each IMU and leg sample at once; a slow thread runs the estimator with everything, and
-// hands its state over after each sweep and image. A third one carries the outputs away. docs/decisions/2026-11-21-the-fast-thread-runs-ahead.md
+// hands its state over after each sweep and image. A third one carries the outputs away.
+// docs/decisions/2026-11-21-the-fast-thread-runs-ahead.md
 #pragma once
 
 #include <array>
@@ -11,29 +12,27 @@
 #include <optional>
 #include <string>
 #include <thread>
-#include <variant>
 #include <vector>
 
 #include "apps/live/backlog.hpp"
 #include "apps/live/handover.hpp"
 #include "apps/live/latency.hpp"
+#include "apps/live/raw.hpp"
 #include "apps/live/ring.hpp"
 #include "apps/live/signal.hpp"
 #include "kilvo/estimator/estimator.hpp"
-#include "kilvo/estimator/forerunner.hpp"
-#include "kilvo/estimator/recent.hpp"
 #include "lab/settings/live_config.hpp"
 
 namespace kilvo::live {
 
 struct LiveStatistics {
-  Latency latency;                                     // of a leg or IMU sample: from push() to its output
-  Latency correction;                                  // from the message that completed a sweep or image to the outputs that know of it
-  std::uint64_t deadline_misses = 0;                   // latencies above a millisecond
-  std::array<std::uint64_t, sensor_count> dropped{};   // by Sensor: oldest given up, because a thread fell behind
-  std::uint64_t dropped_outputs = 0;                   // that nobody carried away in time
-  std::map<std::string, std::size_t> deepest;          // queue -> most that waited in it
-  std::map<std::string, double> cpu_seconds;           // thread -> time
+  Latency latency;                                    // of a leg or IMU sample: from push() to its output
+  Latency correction;                                 // from the message that completed a sweep or image to the outputs that know of it
+  std::uint64_t deadline_misses = 0;                  // latencies above a millisecond
+  std::array<std::uint64_t, sensor_count> dropped{};  // by Sensor: oldest given up, because a thread fell behind
+  std::uint64_t dropped_outputs = 0;                  // that nobody carried away in time
+  std::map<std::string, std::size_t> deepest;         // queue -> most that waited in it
+  std::map<std::string, double> cpu_seconds;          // thread -> time
   std::vector<std::string> warnings;
 };
 
@@ -58,7 +57,8 @@ class LiveRunner {
   /// All that has been pushed has been processed, and every output has been carried away.
   bool is_idle() const;
 
-  /// What has been pushed is processed; then all threads end. More than once does nothing. Throws what a sink threw; it is not called again.
+  /// What has been pushed is processed; then all threads end. More than once does nothing. Throws what a sink threw; it is not called
+  /// again.
   void stop();
   /// A sink threw.
   bool failed() const { return failed_; }
@@ -77,7 +77,6 @@ class LiveRunner {
     JointSample joints;
     Clock::time_point at;
   };
-  using Raw = std::variant<ImuSample, Feet>;
   struct Fork {
     Forerunner runner;
     std::optional<Clock::time_point> corrected;  // when the message arrived that completed a sweep or image; none of others
@@ -106,7 +105,7 @@ class LiveRunner {
   lab::LiveConfig config_;
   Sinks sinks_;
 
-  std::mutex pushing_;  // of those who push; the fast thread never asks for it
+  std::mutex pushing_;                                   // of those who push; the fast thread never asks for it
   std::array<std::uint64_t, sensor_count> not_taken_{};  // samples that the fast thread had no room for
   Backlog backlog_;
   Ring<Sample> samples_;

@@ -14,7 +14,9 @@ class Ring {
   explicit Ring(std::size_t capacity) : slots_(capacity) {}
 
   /// For the writer: the slot to write into, nullptr when all are full; then push() hands it over.
-  T* vacant() { return head_.load(std::memory_order_relaxed) - tail_.load(std::memory_order_acquire) < slots_.size() ? &slot(head_) : nullptr; }
+  T* vacant() {
+    return head_.load(std::memory_order_relaxed) - tail_.load(std::memory_order_acquire) < slots_.size() ? &slot(head_) : nullptr;
+  }
   void push() { head_.store(head_.load(std::memory_order_relaxed) + 1, std::memory_order_release); }
 
   /// For the reader: the oldest, nullptr when there is none; then pop() gives its slot back.

@@ -1,7 +1,6 @@
 #include "apps/live/ring.hpp"
 
 #include <gtest/gtest.h>
-
 #include <thread>
 
 #include "apps/live/handover.hpp"

@@ -1,9 +1,8 @@
 // Wakes a thread. Posting neither blocks nor allocates.
 #pragma once
 
-#include <semaphore.h>
-
 #include <cerrno>
+#include <semaphore.h>
 
 namespace kilvo::live {
 

@@ -1,10 +1,9 @@
 #include "apps/live/thread_settings.hpp"
 
-#include <pthread.h>
-#include <sched.h>
-
 #include <cstring>
 #include <ctime>
+#include <pthread.h>
+#include <sched.h>
 
 namespace kilvo::live {
 

@@ -79,7 +79,7 @@ class Estimator {
   void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
   bool uses(Sensor s) const { return used_[static_cast<std::size_t>(s)]; }
   bool keep_finite(bool definite = false);  // `definite`: looks at the whole covariance
-  Output output_now();  // with what a sweep and an image left to go out
+  Output output_now();                      // with what a sweep and an image left to go out
   void emit(std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0, double contact_us = 0);
 
   // asynchronous.cpp: IMU and legs
@@ -94,7 +94,8 @@ class Estimator {
   void lose_legs(Time t);
   bool legs_may_return(Time t);
   void stand(const ImuSample& s);  // without any other sense, a robot that stands has no velocity
-  bool register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters, const UndistortionNoise& within_scan);
+  bool register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters,
+                      const UndistortionNoise& within_scan);
   bool may_learn(const Estimate& prior, const RegistrationReport& report);
   void refuse_sweep(Time t);
   void note_outage(Time sweep_begin);
@@ -106,7 +107,7 @@ class Estimator {
   void process(const LidarScan& scan, Time end, std::vector<Output>& out);
   bool has_no_shape(const Estimate& prior) const;
   void learn(const LidarModel& model, const std::vector<PointCluster>& clusters);  // the map grows
-  void settle(const Estimate& e);  // nothing before it will be replayed
+  void settle(const Estimate& e);                                                  // nothing before it will be replayed
 
   // images.cpp
   const char* image_fault(const CameraImage& image);
@@ -129,10 +130,10 @@ class Estimator {
   Estimate closed_;                   // at the newest IMU sample, all intervals before it with both their ends
   Estimate anchor_;                   // after the last sweep, at the sweep's own time; what came since is replayed on it
   Replay replay_;                     // from the anchor on
-  std::deque<Pending> pending_;  // by end
+  std::deque<Pending> pending_;       // by end
   bool ended_ = false;
-  std::deque<Output> sweeps_;    // results of sweeps, each to go out with one of the next leg samples
-  std::deque<Output> images_;    // the same of images
+  std::deque<Output> sweeps_;  // results of sweeps, each to go out with one of the next leg samples
+  std::deque<Output> images_;  // the same of images
   std::optional<Time> last_output_;
   Trajectory trajectory_;
   VoxelMap map_;
@@ -147,9 +148,9 @@ class Estimator {
   MountCheck mount_check_;
   bool mount_is_doubted_ = false, size_is_doubted_ = false;
   int images_in_vain_ = 0;
-  Time images_from_{};  // earlier ones are not used
-  Time sweeps_from_{};  // earlier ones are used when the velocity is known
-  std::vector<PointXYZI> seen_W_;      // points of the last sweep
+  Time images_from_{};                             // earlier ones are not used
+  Time sweeps_from_{};                             // earlier ones are used when the velocity is known
+  std::vector<PointXYZI> seen_W_;                  // points of the last sweep
   std::optional<Eigen::Vector3d> last_seen_from_;  // where the last image was taken, m
 
   std::optional<LegKinematics> kinematics_;

@@ -42,19 +42,19 @@ class Forerunner {
   // From the estimator:
   bool started_ = false, imu_lost_ = false;
   double accel_scale_ = 1;
-  Estimate closed_;                 // at an IMU sample
-  Estimate now_;                    // at the newest measurement
-  Replay replay_;                   // from closed_ on
+  Estimate closed_;  // at an IMU sample
+  Estimate now_;     // at the newest measurement
+  Replay replay_;    // from closed_ on
   ContactEstimator contacts_;
   StanceTracker stances_;
-  std::optional<Time> last_legs_;   // while the legs are used
-  double leg_period_ = 0;           // s
+  std::optional<Time> last_legs_;  // while the legs are used
+  double leg_period_ = 0;          // s
   Modality modality_ = Modality::coast;
   const char* cause_ = "start";
   PoseCovariance map_error_ = PoseCovariance::Zero();
 
-  Duration lag_{};                  // by which the leg samples' stamps trail the IMU's as they arrive
-  bool with_legs_ = false;          // the newest output is of a leg sample
+  Duration lag_{};                            // by which the leg samples' stamps trail the IMU's as they arrive
+  bool with_legs_ = false;                    // the newest output is of a leg sample
   double kinematic_us_ = 0, contact_us_ = 0;  // what that took
 };
 

@@ -39,12 +39,12 @@ class Health {
 
  private:
   struct Tracker {
-    std::optional<Time> stamp;           // of the newest
+    std::optional<Time> stamp;            // of the newest
     std::optional<Time> heard_since_imu;  // its first stamp since the IMU spoke last
     double interval_squares = 0;
-    int same = 0;                            // messages in a row that said the same
-    Time same_since{};                       // the first of them
-    int different = 0;                       // messages in a row that did not, until it is known to be alive
+    int same = 0;       // messages in a row that said the same
+    Time same_since{};  // the first of them
+    int different = 0;  // messages in a row that did not, until it is known to be alive
     bool frozen = false;
     std::uint64_t imu_then = 0, since = 0;  // IMU messages at the mark, own messages since
     std::uint64_t imu_before = 0, before = 0;
@@ -58,10 +58,10 @@ class Health {
   std::array<double, sensor_count> rates_;
   std::array<StreamHealth, sensor_count> streams_;
   std::array<Tracker, sensor_count> trackers_;
-  ImuSample imu_;                       // the last
+  ImuSample imu_;                            // the last
   std::vector<double> position_, velocity_;  // of the last leg message
   std::uint64_t cloud_ = 0, picture_ = 0;    // fingerprints of the last
-  double imu_motion_ = 0;               // rad/s, how much the rate has varied lately
+  double imu_motion_ = 0;                    // rad/s, how much the rate has varied lately
   Eigen::Vector3d gyro_mean_ = Eigen::Vector3d::Zero();
   double imu_silence_ = 0;
 };

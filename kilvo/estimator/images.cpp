@@ -44,8 +44,8 @@ const char* Estimator::image_fault(const CameraImage& image) {
     return "another size than configured";
   }
   if (picture.channels != 1 && picture.channels != 3) return "neither grey nor colour";
-  const std::size_t values = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height) *
-                             static_cast<std::size_t>(picture.channels);
+  const std::size_t values =
+      static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height) * static_cast<std::size_t>(picture.channels);
   return picture.pixels.size() == values ? nullptr : "cut short";
 }
 
@@ -90,7 +90,8 @@ void Estimator::process(const CameraImage& image) {
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::camera)].used;
   trajectory_.correct(image.t, estimate_->x.pose(), estimate_->x.v - prior.x.v);
   const SE3 T_WI = estimate_->x.pose();
-  if (!weak_.isZero(0) && model.report().used >= enough) map_error_.seen(T_WI, model.by_frame(), weak_, last_seen_from_ ? (T_WI.p - *last_seen_from_).norm() : 0);
+  if (!weak_.isZero(0) && model.report().used >= enough)
+    map_error_.seen(T_WI, model.by_frame(), weak_, last_seen_from_ ? (T_WI.p - *last_seen_from_).norm() : 0);
   last_seen_from_ = T_WI.p;
   learn_from(model, tracks, pyramid, depth, prior);
   settle(*estimate_);
@@ -135,9 +136,10 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI) {
     return text;
   };
   const Eigen::Vector3d degrees = *psi * (180 / M_PI);
-  statistics_.warnings.push_back("the images fit a camera that is turned by " + tenths(degrees.norm()) + " degrees or more (" + tenths(degrees.x()) +
-                                 ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()) +
-                                 " about the axes of the IMU) against camera.T_imu_camera.R: is the calibration that of this robot, and camera.time_offset right?");
+  statistics_.warnings.push_back(
+      "the images fit a camera that is turned by " + tenths(degrees.norm()) + " degrees or more (" + tenths(degrees.x()) + ", " +
+      tenths(degrees.y()) + ", " + tenths(degrees.z()) +
+      " about the axes of the IMU) against camera.T_imu_camera.R: is the calibration that of this robot, and camera.time_offset right?");
 }
 
 void Estimator::learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,

@@ -30,16 +30,16 @@ struct StageTimes {
 struct Output {
   Time t{};
   State x;
-  Covariance P = Covariance::Zero();  // of the error relative to the first pose (state.hpp: at)
+  Covariance P = Covariance::Zero();                // of the error relative to the first pose (state.hpp: at)
   Eigen::Vector3d omega = Eigen::Vector3d::Zero();  // bias-free angular rate of the newest IMU sample, in the IMU frame, rad/s
   Modality modality = Modality::coast;
-  const char* cause = "start";       // of the last change of modality
-  bool is_sweep = false;             // state after the last update of a sweep
-  bool is_image = false;             // state after the update of an image
-  std::optional<Contacts> contacts;  // of each leg sample
-  double kinematic_us = 0;           // of a leg sample: kinematics, contacts, prediction and update
-  double contact_us = 0;             // the contacts' part of it
-  StageTimes stages;                 // of a sweep, of an image
+  const char* cause = "start";        // of the last change of modality
+  bool is_sweep = false;              // state after the last update of a sweep
+  bool is_image = false;              // state after the update of an image
+  std::optional<Contacts> contacts;   // of each leg sample
+  double kinematic_us = 0;            // of a leg sample: kinematics, contacts, prediction and update
+  double contact_us = 0;              // the contacts' part of it
+  StageTimes stages;                  // of a sweep, of an image
   std::vector<Indicator> indicators;  // of a sweep, of an image
   // Only of sweeps:
   std::vector<PointXYZI> points_W;  // undistorted, in the world

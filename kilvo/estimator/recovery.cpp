@@ -7,10 +7,10 @@ namespace kilvo {
 namespace {
 
 // A humanoid that walks: how fast it turns, how much it leans, how much its velocity changes and how far that takes it (one sigma).
-constexpr double turning = 0.4;        // rad/s
-constexpr double leaning = 0.06;       // rad
+constexpr double turning = 0.4;                        // rad/s
+constexpr double leaning = 0.06;                       // rad
 constexpr double velocity = 0.3, more_velocity = 0.1;  // m/s, m/s per s of the gap
-constexpr double acceleration = 3.0;   // m/s^2: in a short gap the velocity has not had the time to change by all that
+constexpr double acceleration = 3.0;                   // m/s^2: in a short gap the velocity has not had the time to change by all that
 
 constexpr double statistics_time = 2.0;  // s
 constexpr double block = 0.25;           // s

@@ -50,10 +50,10 @@ struct Recovery {
   bool imu_lost = false;             // the last output said so
   std::optional<Time> legs_waiting;  // since when leg messages come again that are not used yet
   bool legs_were_there = false;
-  int sweeps_to_go = 0;                // consistent sweeps before the map grows again
-  std::optional<Time> refused_since;   // sweeps that fit nowhere
-  std::optional<Time> last_standing;   // last update by standing still
-  double legs_blind_until_sigma = 0;   // m/s
+  int sweeps_to_go = 0;               // consistent sweeps before the map grows again
+  std::optional<Time> refused_since;  // sweeps that fit nowhere
+  std::optional<Time> last_standing;  // last update by standing still
+  double legs_blind_until_sigma = 0;  // m/s
 };
 
 }  // namespace kilvo

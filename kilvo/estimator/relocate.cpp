@@ -15,7 +15,7 @@ constexpr double well_known_position = 0.08, well_known_rotation = 0.03;
 // The grid: what a registration starting from its points can reach.
 constexpr double step = 0.25, yaw_step = 0.09;  // m, rad
 constexpr int most_steps = 4, most_steps_up = 2, most_steps_yaw = 5;
-constexpr std::size_t probe_count = 160;      // clusters that are looked up for each pose of the grid
+constexpr std::size_t probe_count = 160;  // clusters that are looked up for each pose of the grid
 constexpr std::size_t finalists = 12;
 constexpr double near_surface = 0.08, per_metre = 0.02;  // m
 // So much of what meets a surface lies on it when the pose is right; a second pose must be worse by a tenth.
@@ -55,7 +55,9 @@ double score_of(const VoxelMap& map, std::span<const Probe> probes, const SE3& T
   return on / static_cast<double>(std::max<std::size_t>(1, probes.size()));
 }
 
-int steps(double sigma, double size, int most) { return std::min(most, static_cast<int>(std::ceil(std::max(0.0, 3 * sigma - size / 2) / size))); }
+int steps(double sigma, double size, int most) {
+  return std::min(most, static_cast<int>(std::ceil(std::max(0.0, 3 * sigma - size / 2) / size)));
+}
 
 std::vector<Candidate> grid_around(const Estimate& e) {
   const Eigen::Vector3d up_W = -e.x.g.normalized();
@@ -146,7 +148,8 @@ std::optional<FoundPose> find_pose(const VoxelMap& map, std::span<const PointClu
   const auto best = std::ranges::max_element(found, {}, worth);
   if (best == found.end() || best->share < least_share) return std::nullopt;
   for (const FoundPose& other : found) {
-    if (!alike(other.x.pose(), best->x.pose(), same_place, same_heading) && worth(other) > (1 - clearly) * worth(*best)) return std::nullopt;
+    if (!alike(other.x.pose(), best->x.pose(), same_place, same_heading) && worth(other) > (1 - clearly) * worth(*best))
+      return std::nullopt;
   }
   return *best;
 }

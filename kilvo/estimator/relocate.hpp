@@ -13,9 +13,9 @@ namespace kilvo {
 bool needs_search(const Covariance& P, const PoseCovariance& known);
 
 struct FoundPose {
-  State x;             // the expected one with the pose of the sweep
+  State x;              // the expected one with the pose of the sweep
   Information<6> info;  // of the registration there
-  double share = 0;    // of the clusters that met a surface: lie on it
+  double share = 0;     // of the clusters that met a surface: lie on it
 };
 
 /// Nothing when the sweep fits nowhere, or in two places alike.

@@ -20,7 +20,7 @@ class SmoothOdometry {
  private:
   double time_;
   std::optional<Time> t_;
-  SE3 pose_;                                        // T_OI
+  SE3 pose_;                                         // T_OI
   Eigen::Vector3d v_ = Eigen::Vector3d::Zero();      // of the output before, in the world, m/s
   Eigen::Vector3d omega_ = Eigen::Vector3d::Zero();  // rad/s
 };

@@ -1,8 +1,7 @@
 #include "kilvo/estimator/smooth_odometry.hpp"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
+#include <gtest/gtest.h>
 
 namespace kilvo {
 namespace {

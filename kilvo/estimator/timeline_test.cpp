@@ -1,8 +1,7 @@
 #include "kilvo/estimator/timeline.hpp"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
+#include <gtest/gtest.h>
 
 namespace kilvo {
 namespace {

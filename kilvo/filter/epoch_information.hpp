@@ -8,7 +8,7 @@
 namespace kilvo {
 
 struct EpochInformation {
-  std::uint32_t epoch = 0;  // VoxelMap::insert
+  std::uint32_t epoch = 0;                    // VoxelMap::insert
   PoseCovariance A = PoseCovariance::Zero();  // information on (rotation, position)
 };
 

@@ -29,12 +29,12 @@ inline Eigen::Vector3d velocity_W(const State& x, const Eigen::Vector3d& p_I, co
 
 /// A sole's slowest corner and its lowest point, in the world.
 struct FootMotion {
-  double slowest = 0;                                // speed of the slowest corner, m/s
-  double speed = 0;                                  // of the lowest point, m/s
-  double vertical = 0;                               // its upward velocity, m/s
+  double slowest = 0;                                  // speed of the slowest corner, m/s
+  double speed = 0;                                    // of the lowest point, m/s
+  double vertical = 0;                                 // its upward velocity, m/s
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // its velocity, m/s
-  double height = 0;                                 // of the lowest point, against gravity, m
-  Eigen::Vector3d lowest = Eigen::Vector3d::Zero();  // the lowest point, m
+  double height = 0;                                   // of the lowest point, against gravity, m
+  Eigen::Vector3d lowest = Eigen::Vector3d::Zero();    // the lowest point, m
 };
 /// `sigma_v`: uncertainty of the state's velocity, m/s; what of a corner's speed it may explain is taken off.
 FootMotion motion_of(const FootPose& foot, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0);

@@ -17,7 +17,7 @@ namespace kilvo {
 /// Pixels of each level of an image pyramid around one point.
 struct Patch {
   static constexpr int levels = 3;
-  static constexpr int size = 16;  // pixels
+  static constexpr int size = 16;   // pixels
   static constexpr int before = 7;  // pixels left of and above the one that holds the centre
 
   std::array<std::array<std::uint8_t, size * size>, levels> pixels;
@@ -45,12 +45,12 @@ struct VisualPoint {
 
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();  // m
   Eigen::Vector3f normal_W = Eigen::Vector3f::UnitZ();
-  float variance = 0;       // of the surface along its normal, m^2
-  std::uint32_t node = 0;   // of the plane it lies on (VoxelMap::Match)
-  float corner = 0;         // smaller eigenvalue of the gradients' scatter, per pixel, grey^2
-  std::uint16_t seen = 0;   // images that agreed
+  float variance = 0;        // of the surface along its normal, m^2
+  std::uint32_t node = 0;    // of the plane it lies on (VoxelMap::Match)
+  float corner = 0;          // smaller eigenvalue of the gradients' scatter, per pixel, grey^2
+  std::uint16_t seen = 0;    // images that agreed
   std::uint16_t failed = 0;  // images that did not, since the last that did
-  std::uint8_t count = 0;   // observations
+  std::uint8_t count = 0;    // observations
   std::array<std::uint32_t, most_observations> observations{};
   std::uint32_t next = VoxelIndex::none;  // in its voxel
   bool used = false;
@@ -110,7 +110,7 @@ class VisualMap {
   void unlink(std::uint32_t point);
 
   VisualMapConfig config_;
-  VoxelIndex voxels_;  // to the first point of each
+  VoxelIndex voxels_;           // to the first point of each
   std::vector<VoxelKey> keys_;  // by point: its voxel
   std::vector<VisualPoint> points_;
   std::vector<Observation> observations_;

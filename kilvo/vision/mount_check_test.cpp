@@ -1,7 +1,6 @@
 #include "kilvo/vision/mount_check.hpp"
 
 #include <gtest/gtest.h>
-
 #include <random>
 
 namespace kilvo {

@@ -74,7 +74,8 @@ TEST(Pyramid, EachLevelShowsARampWhereAtLevelSays) {
   for (int level = 0; level < 4; ++level) {
     for (int i = 0; i < 200; ++i) {
       const Eigen::Vector2d pixel(random.uniform(40, 280), random.uniform(40, 216)), there = at_level(pixel, level);
-      const auto seen = sample(levels[static_cast<std::size_t>(level)].pixels.data(), levels[static_cast<std::size_t>(level)].width, static_cast<float>(there.x()), static_cast<float>(there.y()));
+      const auto seen = sample(levels[static_cast<std::size_t>(level)].pixels.data(), levels[static_cast<std::size_t>(level)].width,
+                               static_cast<float>(there.x()), static_cast<float>(there.y()));
       EXPECT_NEAR(seen, ramp(pixel), 0.75) << "level " << level;  // each level rounds; half a pixel of level 3 would be 2
     }
   }

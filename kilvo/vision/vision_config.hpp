@@ -8,14 +8,14 @@
 namespace kilvo {
 
 struct VisionConfig {
-  int cell = 32;                // px
-  double read_noise = 1.5;      // grey
-  double shot_noise = 0.015;    // grey
-  double pixel_error = 0.05;    // px
+  int cell = 32;              // px
+  double read_noise = 1.5;    // grey
+  double shot_noise = 0.015;  // grey
+  double pixel_error = 0.05;  // px
   double bias_share = 0.01;
-  double min_corner = 4.0;      // grey^2/px^2
+  double min_corner = 4.0;  // grey^2/px^2
   double min_correlation = 0.8;
-  double gate = 4.0;            // sigma
+  double gate = 4.0;  // sigma
 
   static constexpr auto fields() {
     return std::tuple{
@@ -24,7 +24,8 @@ struct VisionConfig {
         Field{"shot_noise", &VisionConfig::shot_noise, "-", "variance of a pixel that comes with each grey level"},
         Field{"pixel_error", &VisionConfig::pixel_error, "px", "what calibration and interpolation do to where a patch is found"},
         Field{"bias_share", &VisionConfig::bias_share, "-", "how much the brightness of one patch may change by itself, as a share"},
-        Field{"min_corner", &VisionConfig::min_corner, "-", "smaller eigenvalue of the gradient's scatter, per pixel, of a patch worth keeping"},
+        Field{"min_corner", &VisionConfig::min_corner, "-",
+              "smaller eigenvalue of the gradient's scatter, per pixel, of a patch worth keeping"},
         Field{"min_correlation", &VisionConfig::min_correlation, "-", "patches that correlate less are not the same surface"},
         Field{"gate", &VisionConfig::gate, "sigma", "patches found farther than this from where they are expected are not used"}};
   }

@@ -61,8 +61,8 @@ class FailingSource final : public MeasurementSource {
   Time begin_;
   std::function<Time()> arrival_;
   Random random_;
-  std::deque<std::pair<Time, Measurement>> ready_;               // by when they arrived
-  std::multimap<Time, Measurement> held_;                        // by when they are due
+  std::deque<std::pair<Time, Measurement>> ready_;  // by when they arrived
+  std::multimap<Time, Measurement> held_;           // by when they are due
   Time arrived_{};
   std::array<std::optional<Measurement>, sensor_count> before_;  // the last unspoilt one, for `freeze`
   std::array<std::uint64_t, sensor_count> dropped_{};

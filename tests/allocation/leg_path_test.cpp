@@ -104,7 +104,8 @@ TEST(Forerunner, TakesNoMemoryOnceItIsWarm) {
     if (imu != nullptr) runner.push(*imu);
     if (joints != nullptr) {
       const auto feet = kinematics.feet(*joints);
-      if (const auto* known = std::get_if<Feet>(&feet); known != nullptr && runner.push(*known)) outputs += runner.output().t > Time{} && warm ? 1 : 0;
+      if (const auto* known = std::get_if<Feet>(&feet); known != nullptr && runner.push(*known))
+        outputs += runner.output().t > Time{} && warm ? 1 : 0;
     }
     counting = false;
     const Time t = stamp_of(*m);

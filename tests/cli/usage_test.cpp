@@ -45,7 +45,8 @@ TEST(Usage, MissingOrImpossibleWordsAreSaid) {
   for (const char* delay : {"lidar", "lidar:", "lidar:-5", "lidar:a", "lidar:5ms", "sonar:5", "lidar:1e9"}) {
     expect_error({"run", "x.bag", "--out", "/tmp/x", "--delay", delay}, 2, "");
   }
-  for (const char* speed : {"0", "-1", "nan", "1e9"}) expect_error({"run", "x.bag", "--out", "/tmp/x", "--realtime", speed}, 2, "--realtime");
+  for (const char* speed : {"0", "-1", "nan", "1e9"})
+    expect_error({"run", "x.bag", "--out", "/tmp/x", "--realtime", speed}, 2, "--realtime");
 }
 
 TEST(Usage, SensorsThatCannotBeUsedAreRefused) {

@@ -97,7 +97,8 @@ class FailingWalk {
     used_ = config.use;
     simulator_ = std::make_unique<lab::Simulator>(scenario(name), config);
     while (auto m = simulator_->next()) measurements_.emplace_back(simulator_->arrived(), *std::move(m));
-    settings_ = lab::parse_settings(lab::simulated_config(config, "sim.urdf"), "simulated", std::string(KILVO_SOURCE_DIR) + "/config/robots");
+    settings_ =
+        lab::parse_settings(lab::simulated_config(config, "sim.urdf"), "simulated", std::string(KILVO_SOURCE_DIR) + "/config/robots");
   }
 
   const lab::Settings& settings() const { return settings_; }

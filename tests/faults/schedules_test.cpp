@@ -38,7 +38,8 @@ std::string words(const std::vector<Failure>& failures) {
   std::string out;
   for (const Failure& f : failures) {
     char text[100];
-    std::snprintf(text, sizeof text, " %s %s %.2f-%.2f (%.2f)", kinds[static_cast<int>(f.kind)], name_of(f.sensor), f.from, f.until, f.amount);
+    std::snprintf(text, sizeof text, " %s %s %.2f-%.2f (%.2f)", kinds[static_cast<int>(f.kind)], name_of(f.sensor), f.from, f.until,
+                  f.amount);
     out += text;
   }
   return out;

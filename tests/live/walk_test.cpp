@@ -1,8 +1,7 @@
 // A walk through the live runner: every message as it arrives, all threads at work. No test here depends on how fast the machine is: after
 // each message it is waited until the threads have nothing to do.
-#include <gtest/gtest.h>
-
 #include <algorithm>
+#include <gtest/gtest.h>
 #include <map>
 #include <thread>
 
@@ -24,8 +23,9 @@ Lived live_through(const test::FailingWalk& walk, std::vector<lab::Failure> fail
   Estimator estimator(walk.settings().robot, config, walk.used());
   lab::LiveConfig live;
   live.max_latency = 10;  // a slow machine gives nothing up
-  live::LiveRunner runner(estimator, walk.settings().robot, config, walk.used(), live,
-                          {[&out](Output o) { out.states.push_back(std::move(o)); }, [&out](Output o) { out.sweeps.push_back(std::move(o)); }});
+  live::LiveRunner runner(
+      estimator, walk.settings().robot, config, walk.used(), live,
+      {[&out](Output o) { out.states.push_back(std::move(o)); }, [&out](Output o) { out.sweeps.push_back(std::move(o)); }});
   walk.play(std::move(failures), [&runner](Measurement m) {
     runner.push(std::move(m));
     while (!runner.is_idle()) std::this_thread::yield();
@@ -87,7 +87,8 @@ TEST(LiveWalk, LateSensorsCostNoMessageAndLittleAccuracy) {
     const Lived lived = live_through(walk(), {{.kind = lab::FailureKind::delay, .sensor = sensor, .amount = seconds}});
     EXPECT_LT(walk().worst_error(lived.states), 0.02) << name_of(sensor);
     EXPECT_GT(lived.states.size(), 2500u) << name_of(sensor);
-    const auto images = std::ranges::count_if(lived.sweeps, &Output::is_image), sweeps = std::ranges::count_if(lived.sweeps, &Output::is_sweep);
+    const auto images = std::ranges::count_if(lived.sweeps, &Output::is_image),
+               sweeps = std::ranges::count_if(lived.sweeps, &Output::is_sweep);
     EXPECT_GE(images, 90) << name_of(sensor);
     EXPECT_GE(sweeps, 90) << name_of(sensor);
   }
@@ -123,7 +124,8 @@ TEST(LiveWalk, WithoutAnImuThereIsNoPoseAfterOneThatSaysSo) {
     if (o.t > walk().time(5.15) && o.t < walk().time(5.95)) during.push_back(&o);
   }
   EXPECT_TRUE(during.empty()) << during.size();
-  const auto lost = std::ranges::find(lived.states, std::string_view("imu lost"), [](const Output& o) { return std::string_view(o.cause); });
+  const auto lost =
+      std::ranges::find(lived.states, std::string_view("imu lost"), [](const Output& o) { return std::string_view(o.cause); });
   ASSERT_NE(lost, lived.states.end());
   EXPECT_EQ(lost->modality, Modality::coast);
 }
