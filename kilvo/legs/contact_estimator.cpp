@@ -19,7 +19,7 @@ constexpr double known_velocity = 0.02;
 // for so long, but for this, m/s; another that stands as well shows the same as well. After a while the level must do.
 constexpr double unknown_velocity = 0.15;
 constexpr Duration steady_window = milliseconds(80), longest_search = milliseconds(1000);
-constexpr double steady = 0.08, alike = 0.1;
+constexpr double steady = 0.08, alike = 0.1, at_rest = 0.05;
 // At the start both feet stand that are at one level, as a share of the height of the IMU over them.
 constexpr double standing_level = 0.025;
 // A swing shorter than this, or slower than a third of the usual, teaches nothing; but several slow ones in a row are how it walks now.
@@ -99,11 +99,16 @@ double ContactEstimator::unsteadiness(const FootState& f, Time t) const {
 }
 
 // Whatever the velocity of the body is: the IMU tells how it changes, so that a foot that stands seems to move by what stays the same.
+// Two feet that do not move against each other both stand.
 bool ContactEstimator::find_standing(Time t) {
   const std::array<double, 2> varied = {unsteadiness(foot_[0], t), unsteadiness(foot_[1], t)};
   const std::size_t best = varied[0] <= varied[1] ? 0 : 1;
-  if (varied[best] > steady) return false;
   const auto newest = [this](std::size_t side) { return foot_[side].samples[(foot_[side].count - 1) % history].velocity; };
+  if ((newest(0) - newest(1)).norm() < at_rest) {
+    contacts_.on = {true, true};
+    return true;
+  }
+  if (varied[best] > steady) return false;
   contacts_.on[best] = true;
   contacts_.on[1 - best] = varied[1 - best] <= steady && (newest(0) - newest(1)).norm() < alike;
   return true;

@@ -53,6 +53,38 @@ TEST(ContactEstimator, ARunThatBecomesASlowWalkIsFollowed) {
   test::expect_changes(slow, walked, 6.5, 9.5, 0.015, 0.015);
 }
 
+// Begun in mid-walk, the velocity wrong by more than that of the walk: whatever the phase, only feet that stand are said to.
+TEST(ContactEstimator, OnAnUnknownVelocityTheFootThatStandsIsFoundByWhatDoesNotChange) {
+  const Gait gait;
+  const Eigen::Vector3d wrong(-0.8, 0.2, 0.1);
+  for (double begin = 2; begin < 2 + gait.cycle(); begin += 0.05) {
+    ContactEstimator estimator{LegConfig{}};
+    bool found = false;
+    for (double s = begin; !found && s < begin + 0.5; s += 0.001) {
+      State x = gait.body(s);
+      x.v += wrong;
+      const Contacts& now = estimator.update(gait.feet(s), x, Eigen::Vector3d::Zero(), Eigen::Vector3d(0, 0, standard_gravity), 1.0);
+      for (std::size_t side = 0; side < 2; ++side) {
+        if (!now.on[side]) continue;
+        found = true;
+        EXPECT_TRUE(gait.stands(side, s)) << "begun at " << begin << ": foot " << side << " at " << s;
+      }
+    }
+    EXPECT_TRUE(found) << "begun at " << begin;
+  }
+}
+
+TEST(ContactEstimator, TwoFeetThatDoNotMoveAgainstEachOtherBothStandAtOnce) {
+  ContactEstimator estimator{LegConfig{}};
+  const Scene scene = test::standing();
+  State x = scene.body(0);
+  Feet feet;
+  feet.t = test::gait_begin;
+  for (std::size_t side = 0; side < 2; ++side) feet.foot[side] = test::seen_from(x, scene.sole(side, 0));
+  x.v = Eigen::Vector3d(0.5, -0.5, 0.1);
+  EXPECT_EQ(estimator.update(feet, x, Eigen::Vector3d::Zero(), {0, 0, standard_gravity}, 1.0).on, (std::array<bool, 2>{true, true}));
+}
+
 TEST(ContactEstimator, OneWildSampleInASwingDoesNotMakeTheRobotFast) {
   const Gait gait;
   ContactEstimator estimator{LegConfig{}};
