@@ -29,6 +29,19 @@ inline lab::SimulatorConfig small(double duration) {
   return config;
 }
 
+/// IMU, LiDAR and a camera of half the usual size.
+inline lab::SimulatorConfig seen_by_half_a_camera(double duration, int points) {
+  lab::SimulatorConfig config = only({Sensor::imu, Sensor::lidar, Sensor::camera}, duration);
+  config.threads = 2;
+  config.lidar.points = points;
+  config.camera.width = 320;
+  config.camera.height = 240;
+  config.camera.fx = config.camera.fy = 170.6;
+  config.camera.cx = 160.4;
+  config.camera.cy = 118.8;
+  return config;
+}
+
 inline std::vector<Measurement> all_of(lab::Simulator& simulator) {
   std::vector<Measurement> out;
   while (auto m = simulator.next()) out.push_back(*std::move(m));

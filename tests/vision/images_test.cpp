@@ -32,14 +32,7 @@ struct Drive {
 class Images : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    lab::SimulatorConfig config = test::only({Sensor::imu, Sensor::lidar, Sensor::camera}, 10);
-    config.threads = 2;
-    config.lidar.points = 8000;
-    config.camera.width = 320;
-    config.camera.height = 240;
-    config.camera.fx = config.camera.fy = 170.6;
-    config.camera.cx = 160.4;
-    config.camera.cy = 118.8;
+    const lab::SimulatorConfig config = test::seen_by_half_a_camera(10, 8000);
     simulator_ = std::make_unique<lab::Simulator>(test::scenario("room"), config);
     settings_ = std::make_unique<lab::Settings>(
         lab::parse_settings(lab::simulated_config(config, "sim.urdf"), "simulated", std::string(KILVO_SOURCE_DIR) + "/config/robots"));
