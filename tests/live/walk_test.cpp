@@ -16,6 +16,11 @@ struct Lived {
   live::LiveStatistics statistics;
 };
 
+void push_and_wait(live::LiveRunner& runner, Measurement m) {
+  runner.push(std::move(m));
+  while (!runner.is_idle()) std::this_thread::yield();
+}
+
 Lived live_through(const test::FailingWalk& walk, std::vector<lab::Failure> failures) {
   Lived out;
   EstimatorConfig config = walk.settings().estimator;
@@ -26,10 +31,7 @@ Lived live_through(const test::FailingWalk& walk, std::vector<lab::Failure> fail
   live::LiveRunner runner(
       estimator, walk.settings().robot, config, walk.used(), live,
       {[&out](Output o) { out.states.push_back(std::move(o)); }, [&out](Output o) { out.sweeps.push_back(std::move(o)); }});
-  walk.play(std::move(failures), [&runner](Measurement m) {
-    runner.push(std::move(m));
-    while (!runner.is_idle()) std::this_thread::yield();
-  });
+  walk.play(std::move(failures), [&runner](Measurement m) { push_and_wait(runner, std::move(m)); });
   runner.stop();
   out.statistics = runner.statistics();
   return out;
@@ -139,7 +141,7 @@ TEST(LiveWalk, WhatASinkThrowsEndsInStop) {
                              throw std::runtime_error("disk full");
                            },
                            [](const Output&) {}});
-  walk().play({}, [&runner](Measurement m) { runner.push(std::move(m)); });
+  walk().play({}, [&runner](Measurement m) { push_and_wait(runner, std::move(m)); });
   EXPECT_THROW(runner.stop(), std::runtime_error);
   EXPECT_TRUE(runner.failed());
   EXPECT_EQ(calls, 1);
