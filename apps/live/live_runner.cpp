@@ -5,7 +5,6 @@
 #include "apps/live/raw.hpp"
 #include "apps/live/thread_settings.hpp"
 #include "kilvo/estimator/fault.hpp"
-#include "kilvo/estimator/stopwatch.hpp"
 
 namespace kilvo::live {
 namespace {

@@ -25,6 +25,12 @@ void Forerunner::close(Time until) {
   if (last_legs_ && *last_legs_ > now_.t) replay_.advance(now_, *last_legs_, nullptr);
 }
 
+// What is not finite goes nowhere: it is silent until the estimator, which throws such a state away, is forked again.
+bool Forerunner::keep_finite() {
+  started_ = is_finite(now_);
+  return started_;
+}
+
 bool Forerunner::push(const ImuSample& raw) {
   if (!started_ || imu_lost_ || fault_of(raw) != nullptr) return false;
   const Time newest = replay_.newest_imu().t;
@@ -36,7 +42,7 @@ bool Forerunner::push(const ImuSample& raw) {
   if (last_legs_ && !are_legs_overdue(s.t - *last_legs_ - lag_, leg_rate_, leg_period_)) return false;
   close(s.t);
   with_legs_ = false;
-  return true;
+  return keep_finite();
 }
 
 bool Forerunner::push(const Feet& feet) {
@@ -60,7 +66,7 @@ bool Forerunner::push(const Feet& feet) {
   if (feet.t == closed_.t) closed_ = now_;
   with_legs_ = true;
   kinematic_us_ = watch.lap_us();
-  return true;
+  return keep_finite();
 }
 
 Output Forerunner::output() const {

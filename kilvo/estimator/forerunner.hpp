@@ -35,6 +35,7 @@ class Forerunner {
  private:
   friend class Estimator;  // fills it
   void close(Time until);
+  bool keep_finite();
 
   // Of the robot, never changed:
   double leg_rate_, imu_rate_;

@@ -13,6 +13,9 @@ namespace kilvo {
 /// After an IMU gap longer than this nothing is known of the motion in between but that it was a walking robot's, s.
 inline constexpr double blind_gap = 0.1;
 
+/// A velocity known to this gives a sweep its shape, and tells a standing foot from a moving one, m/s.
+inline constexpr double known_velocity = 0.15;
+
 /// Adds to the covariance what a walking robot may have done in the part [begin, end] of a gap.
 void widen(Estimate& e, Time begin, Time end, double gap);
 
@@ -53,7 +56,6 @@ struct Recovery {
   int sweeps_to_go = 0;               // consistent sweeps before the map grows again
   std::optional<Time> refused_since;  // sweeps that fit nowhere
   std::optional<Time> last_standing;  // last update by standing still
-  double legs_blind_until_sigma = 0;  // m/s
 };
 
 }  // namespace kilvo

@@ -80,7 +80,6 @@ bool Estimator::waits_for_scan(Time image, Time until) const {
 }
 
 bool Estimator::has_no_shape(const Estimate& prior) const {
-  constexpr double known_velocity = 0.15;  // m/s: within half a sweep, less than the smallest voxel's plane can tell
   return prior.P.diagonal().segment<3>(at::v).maxCoeff() > known_velocity * known_velocity;
 }
 

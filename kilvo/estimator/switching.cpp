@@ -96,7 +96,6 @@ void Estimator::lose_legs(Time t) {
 bool Estimator::legs_may_return(Time t) {
   if (last_legs_ || !recovery_.legs_were_there) return true;
   constexpr Duration longest_wait = std::chrono::seconds(1), calm = std::chrono::milliseconds(20);
-  constexpr double known_velocity = 0.15;  // m/s
   if (!recovery_.legs_waiting) recovery_.legs_waiting = t;
   const double sigma_v = std::sqrt(std::max(0.0, estimate_->P.block<3, 3>(at::v, at::v).trace() / 3));
   if (health_.is_frozen(Sensor::legs)) return false;
