@@ -9,7 +9,8 @@ namespace {
 constexpr double least_share = 0.005;
 // A cloud that is a sheet or a line; the information speaks for itself, so this alone degrades only what is next to flat.
 constexpr double least_ratio = 1e-4;
-constexpr int fewest_visual_points = 20;
+// Each says two things, of seven that are looked for.
+constexpr int fewest_visual_points = 10;
 // Fewer rows, or more directions than these that they do not hold: not worth the name of a registration.
 constexpr int fewest_rows = 30, most_weak = 3;
 

@@ -68,13 +68,13 @@ void Estimator::process(const CameraImage& image) {
   const std::vector<Track> tracks = select_tracks(visual_map_, *camera_, expected, depth, config_.vision);
   PhotometricModel model(visual_map_, *camera_, T_CI_, pyramid, tracks, prior, config_.vision);
   const Estimate unlit = prior;
-  if (const auto tau = model.exposure_at(prior.x)) {
+  if (const auto exposure = model.exposure_at(prior.x)) {
     // Lamps are switched and exposures jump: what it was says nothing, the image all.
-    constexpr double unsure = 0.1;
-    prior.x.tau = *tau;
+    prior.x.tau = std::exp(exposure->log);
+    const double unsure = exposure->sigma * prior.x.tau;
     prior.P.row(at::tau).setZero();
     prior.P.col(at::tau).setZero();
-    prior.P(at::tau, at::tau) = unsure * unsure * *tau * *tau;
+    prior.P(at::tau, at::tau) = unsure * unsure;
   }
   UpdateConfig update_config = config_.update;
   update_config.min_iterations = model.iterations();
@@ -116,7 +116,7 @@ bool Estimator::is_lost_among_patches(const Estimate& prior) const {
 // that goes on, for then the world has changed.
 bool Estimator::says_nothing(const PhotometricModel::Report& report) {
   constexpr int one_in = 5, patient = 20;  // images
-  const bool nothing = report.tracks >= enough && one_in * report.used < report.tracks;
+  const bool nothing = report.tracks >= enough && (report.used == 0 || one_in * report.used < report.tracks - report.saturated);
   images_in_vain_ = nothing ? images_in_vain_ + 1 : 0;
   return nothing && images_in_vain_ <= patient;
 }

@@ -121,7 +121,7 @@ std::vector<NewPoint> new_points(const VoxelMap& map, const Camera& camera, cons
   std::erase_if(best, [](const NewPoint& p) { return p.point.corner <= 0; });
   constexpr int columns = 5;  // of blocks
   const auto corners = static_cast<std::size_t>(std::ranges::count_if(tracks, [](const Track& t) { return !t.plain; }));
-  if (corners + best.size() < enough_corners) add_plain(search, camera.width() / columns, tracks, best);
+  if (corners + best.size() < plenty_of_corners) add_plain(search, camera.width() / columns, tracks, best);
   return best;
 }
 

@@ -7,16 +7,19 @@
 namespace kilvo {
 namespace {
 
-// Brighter pixels are taken as saturated.
-constexpr float bright = 252;
+// Between pixels of which one is saturated the values are too low.
+constexpr float bright = 245;
+// What is to be as bright as this is not looked at: if it were refused for being found too bright, those found too dark would remain.
+constexpr float expected_bright = 235;
+constexpr float seen_bright = 252;
 
 struct Sums {
-  float xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top;
+  float xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top, top_seen;
 };
 
 // Over the pixels, in lanes that are added at the end.
 KILVO_WIDE Sums sum_up(const Template& patch, const Values& image, float t, float tp) {
-  Lanes xx{}, xy{}, yy{}, sx{}, sy{}, xr{}, yr{}, sr{}, rr{}, sum{}, top{};
+  Lanes xx{}, xy{}, yy{}, sx{}, sy{}, xr{}, yr{}, sr{}, rr{}, sum{}, top{}, top_seen{};
   for (std::size_t k = 0; k < Template::count; k += lanes) {
     Lanes value, seen, x, y;
     read_lanes(value, &patch.value[k]);
@@ -36,35 +39,42 @@ KILVO_WIDE Sums sum_up(const Template& patch, const Values& image, float t, floa
     sr += r;
     rr += r * r;
     sum += value;
-    const Lanes brighter = value > seen ? value : seen;
-    top = brighter > top ? brighter : top;
+    top = value > top ? value : top;
+    top_seen = seen > top_seen ? seen : top_seen;
   }
-  float most = 0;
-  for (std::size_t i = 0; i < lanes; ++i) most = std::max(most, top[i]);
-  return {total(xx), total(xy), total(yy), total(sx), total(sy), total(xr), total(yr), total(sr), total(rr), total(sum), most};
+  float most = 0, most_seen = 0;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    most = std::max(most, top[i]);
+    most_seen = std::max(most_seen, top_seen[i]);
+  }
+  return {total(xx), total(xy), total(yy), total(sx), total(sy), total(xr), total(yr), total(sr), total(rr), total(sum), most, most_seen};
 }
 
 }  // namespace
 
-PatchSums sums_of(const Template& patch, const Values& image, double tau, double tau_patch, double bias_variance, double variance) {
+PatchSums sums_of(const Template& patch, const Values& image, double tau, double tau_patch) {
   const auto t = static_cast<float>(tau), tp = static_cast<float>(tau_patch);
   // The gradient is the patch's, so that it stays the same from iterate to iterate. The exposure is known by the patch's mean alone: by its
   // contrast, noise that is in the patch and in r would make each generation of patches look a little darker than the last.
   const Sums sums = sum_up(patch, image, t, tp);
-  const auto& [xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top] = sums;
+  const auto& [xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top, top_seen] = sums;
   constexpr double n = Template::count;
   PatchSums out;
-  out.saturated = top > bright;
+  out.saturated = top > bright || top * tp / t > expected_bright || top_seen > seen_bright;
   const double i = static_cast<double>(tp / t * sum) / n;
-  const Eigen::Vector3d s(static_cast<double>(sx), static_cast<double>(sy), n * i);
-  out.A << static_cast<double>(xx), static_cast<double>(xy), i * s[0], static_cast<double>(xy), static_cast<double>(yy), i * s[1], i * s[0],
-      i * s[1], n * i * i;
-  out.b << static_cast<double>(xr), static_cast<double>(yr), i * static_cast<double>(sr);
-  const double pixels = n + variance / bias_variance;
-  out.A -= s * s.transpose() / pixels;
-  out.b -= s * static_cast<double>(sr) / pixels;
-  out.mean_square = (static_cast<double>(rr) - static_cast<double>(sr) * static_cast<double>(sr) / n) / (n - 1);
+  out.h = {static_cast<double>(sx), static_cast<double>(sy), n * i};
+  out.r = static_cast<double>(sr);
+  out.A << static_cast<double>(xx), static_cast<double>(xy), i * out.h[0], static_cast<double>(xy), static_cast<double>(yy), i * out.h[1],
+      i * out.h[0], i * out.h[1], n * i * i;
+  out.b << static_cast<double>(xr), static_cast<double>(yr), i * out.r;
+  out.mean_square = (static_cast<double>(rr) - out.r * out.r / n) / (n - 1);
   return out;
+}
+
+void PatchSums::allow(double bias_variance, double variance) {
+  const double pixels = Template::count + variance / bias_variance;
+  A -= h * h.transpose() / pixels;
+  b -= h * r / pixels;
 }
 
 float mean_of(const Values& values) {
@@ -76,5 +86,9 @@ float mean_of(const Values& values) {
   }
   return total(sum) / Template::count;
 }
+
+float top_of(const Values& values) { return *std::ranges::max_element(values); }
+
+bool is_saturated(float top, double expected) { return top > bright || expected > double{expected_bright}; }
 
 }  // namespace kilvo

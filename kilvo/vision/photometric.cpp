@@ -6,6 +6,7 @@
 #include <map>
 
 #include "kilvo/filter/pose_error.hpp"
+#include "kilvo/vision/brightness.hpp"
 
 namespace kilvo {
 namespace {
@@ -114,8 +115,11 @@ PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x)
   };
   out.expected_variance = pixel_variance(x.tau, brightness * p.tau / x.tau) + pixel_variance(p.tau, brightness);
   const double bias = config_.bias_share * p.tau * brightness + 1e-3;
+  out.bias_variance = bias * bias;
+  constexpr float dark = 1;
+  out.brightness = std::log(p.tau * std::max(1.0, brightness) / static_cast<double>(std::max(dark, mean_of(seen))));
   out.view = *view;
-  out.sums = sums_of(*p.patch, seen, x.tau, p.tau, bias * bias, out.expected_variance);
+  out.sums = sums_of(*p.patch, seen, x.tau, p.tau);
   verdict.looked = !out.sums.saturated;
   out.valid = !out.sums.saturated && static_cast<double>(verdict.correlation) > config_.min_correlation;
   return out;
@@ -199,20 +203,27 @@ void PhotometricModel::add(std::size_t i, const Part& part, double scale2, const
 
 Information<7> PhotometricModel::operator()(const State& x, const Covariance& prior) {
   prepare(schedule_[std::min(call_++, schedule_.size() - 1)]);
-  report_.used = report_.moved = report_.unlike = 0;
+  report_.used = report_.moved = report_.unlike = report_.saturated = 0;
   std::vector<Part> parts(tracks_.size());
-  std::vector<double> ratios;
+  std::vector<double> ratios, brightness;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     parts[i] = evaluate(i, x);
-    if (parts[i].valid) ratios.push_back(parts[i].sums.mean_square / parts[i].expected_variance);
+    if (parts[i].valid) {
+      ratios.push_back(parts[i].sums.mean_square / parts[i].expected_variance);
+      brightness.push_back(parts[i].brightness);
+    }
+    if (parts[i].sums.saturated) ++report_.saturated;
     if (!parts[i].valid && prepared_[i].patch && !prepared_[i].plain && !parts[i].sums.saturated) ++report_.unlike;
   }
   // Noise of the pixels that nobody configured: of the whole image.
   const double scale2 = ratios.empty() ? 1 : std::max(1.0, median_of(ratios));
   report_.noise = std::sqrt(scale2);
   groups_.clear();
+  const Brightness common = brightness.empty() ? Brightness{} : brightness_of(std::move(brightness));
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    if (parts[i].valid) add(i, parts[i], scale2, x, prior);
+    if (!parts[i].valid) continue;
+    parts[i].sums.allow(common.doubt(parts[i].brightness) * parts[i].bias_variance, parts[i].expected_variance);
+    add(i, parts[i], scale2, x, prior);
   }
   Information<7> total;
   total.columns = {at::R, at::R + 1, at::R + 2, at::p, at::p + 1, at::p + 2, at::tau};
@@ -232,25 +243,6 @@ Information<7> PhotometricModel::operator()(const State& x, const Covariance& pr
   }
   report_.used = total.rows;
   return total;
-}
-
-std::optional<double> PhotometricModel::exposure_at(const State& x) const {
-  std::vector<double> ratios, of_plain;
-  for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    const Prepared& p = prepared_[i];
-    const auto view = view_of(camera_, T_CI_, x.pose(), p.p_W);
-    if (!p.patch || !view || !camera_.sees(view->pixel, 2 * border * (1 << level_))) continue;
-    Values seen;
-    sample_patch(pyramid_[static_cast<std::size_t>(level_)], at_level(view->pixel, level_).cast<float>(), seen);
-    const float here = mean_of(seen), there = mean_of(p.patch->value);
-    constexpr float dark = 8, light = 240;
-    if (here > dark && here < light && there > dark && there < light)
-      (p.plain ? of_plain : ratios).push_back(p.tau * static_cast<double>(there / here));
-  }
-  // A plain surface is known to be the same only by where it is.
-  if (ratios.size() < enough_corners) ratios.insert(ratios.end(), of_plain.begin(), of_plain.end());
-  if (ratios.size() < enough_corners) return std::nullopt;
-  return median_of(ratios);
 }
 
 }  // namespace kilvo

@@ -6,11 +6,13 @@
 #include <Eigen/Core>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "kilvo/filter/epoch_information.hpp"
 #include "kilvo/filter/measurement_rows.hpp"
 #include "kilvo/map/visual_map.hpp"
+#include "kilvo/vision/brightness.hpp"
 #include "kilvo/vision/camera.hpp"
 #include "kilvo/vision/patch_sums.hpp"
 #include "kilvo/vision/patches.hpp"
@@ -38,7 +40,7 @@ class PhotometricModel {
     float correlation = 0;
   };
   struct Report {
-    int tracks = 0, used = 0, moved = 0, unlike = 0;
+    int tracks = 0, used = 0, moved = 0, unlike = 0, saturated = 0;
     double noise = 1;  // of the pixels, times what was expected (standard deviation)
   };
   /// Keeps references: the map, the camera, the pyramid and the tracks must outlive it. `prior`: of the pose before the image; it says how
@@ -58,8 +60,8 @@ class PhotometricModel {
   /// How often it must be called to be at the finest level.
   int iterations() const { return static_cast<int>(schedule_.size()); }
 
-  /// The inverse exposure that makes the image as bright as the patches: a median. None with too few of them.
-  std::optional<double> exposure_at(const State& x) const;
+  /// The inverse exposure that makes the image as bright as most of the patches. None with too few of them.
+  std::optional<Brightness> exposure_at(const State& x) const;
 
   /// Of the first evaluation.
   const std::vector<Turn>& turns() const { return turns_; }
@@ -82,8 +84,11 @@ class PhotometricModel {
     PatchView view;
     PatchSums sums;
     double expected_variance = 1;  // of a pixel's r
+    double bias_variance = 1;      // of the brightness of the patch, which may change by itself
+    double brightness = 0;         // log of the inverse exposure at which it would look as bright as it did
     bool valid = false;
   };
+  std::pair<Values, double> as_first_seen(std::size_t i, const SE3& T_CW) const;  // a patch and its inverse exposure
   void prepare(int level);
   Part evaluate(std::size_t i, const State& x);
   /// Where a patch is found: how far from where it is seen, and how surely, by itself.

@@ -60,8 +60,11 @@ class Photometric : public testing::Test {
     const DepthView depth(camera_, T_CW, points_W);
     tracks_ = select_tracks(map_, camera_, T_CW, depth, config_);
     PhotometricModel model(map_, camera_, T_CI_, pyramid, tracks_, prior, config_);
-    if (const auto tau = model.exposure_at(prior.x)) prior.x.tau = *tau;
     prior.P(at::tau, at::tau) = 0.01;
+    if (const auto exposure = model.exposure_at(prior.x)) {
+      prior.x.tau = std::exp(exposure->log);
+      prior.P(at::tau, at::tau) = std::pow(exposure->sigma * prior.x.tau, 2);
+    }
     UpdateConfig config;
     config.min_iterations = model.iterations();
     const Update out = update(prior, model, config);
@@ -172,6 +175,14 @@ TEST_F(Photometric, TheExposureIsFollowedThroughAFactorOfTwo) {
     const Update u = see(scene_.image(camera_, moved, brightness), prior_at(moved, twist(1e-3, 0, 0, 0.002, 0, 0)));
     EXPECT_NEAR(u.posterior.x.tau * brightness, 1, 0.01) << brightness;
     EXPECT_LT(error_of(u, moved).segment<3>(at::p).norm(), 1e-3) << brightness;
+  }
+}
+
+TEST_F(Photometric, AnImageThatIsSaturatedInPartIsNotTakenForADarkerOne) {
+  for (const double brightness : {1.7, 1.9, 2.1}) {
+    const Update u = see(scene_.image(camera_, moved, brightness, 1.5), prior_at(moved, twist(1e-3, 0, 0, 0.002, 0, 0)));
+    EXPECT_GT(5 * report_.saturated, 2 * report_.tracks) << brightness;
+    EXPECT_NEAR(u.posterior.x.tau * brightness, 1, 0.01) << brightness;
   }
 }
 

@@ -120,7 +120,7 @@ std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, con
     if (best.worth > 0) tracks.push_back(best.track);
   }
   const std::size_t corners = tracks.size() - static_cast<std::size_t>(std::ranges::count_if(tracks, &Track::plain));
-  if (corners >= enough_corners) std::erase_if(tracks, [](const Track& t) { return t.plain; });
+  if (corners >= plenty_of_corners) std::erase_if(tracks, [](const Track& t) { return t.plain; });
   return tracks;
 }
 

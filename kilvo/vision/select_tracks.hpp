@@ -36,8 +36,10 @@ class CellGrid {
   int cell_, columns_, rows_;
 };
 
-/// So many tell the exposure by themselves: then plain patches are neither begun nor looked at.
+/// So many tell the exposure by themselves.
 inline constexpr std::size_t enough_corners = 8;
+/// With more of them plain patches are neither begun nor looked at.
+inline constexpr std::size_t plenty_of_corners = 24;
 
 /// What the camera at T_CW should see of the map.
 std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,
