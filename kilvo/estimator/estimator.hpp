@@ -112,6 +112,7 @@ class Estimator {
   // images.cpp
   const char* image_fault(const CameraImage& image);
   void process(const CameraImage& image);
+  void note_drift(std::span<const PhotometricModel::FrameShare> shares, const SE3& T_WI);
   bool is_lost_among_patches(const Estimate& prior) const;
   bool says_nothing(const PhotometricModel::Report& report);
   void check_mount(const PhotometricModel& model, const SO3& R_WI);
@@ -148,10 +149,9 @@ class Estimator {
   MountCheck mount_check_;
   bool mount_is_doubted_ = false, size_is_doubted_ = false;
   int images_in_vain_ = 0;
-  Time images_from_{};                             // earlier ones are not used
-  Time sweeps_from_{};                             // earlier ones are used when the velocity is known
-  std::vector<PointXYZI> seen_W_;                  // points of the last sweep
-  std::optional<Eigen::Vector3d> last_seen_from_;  // where the last image was taken, m
+  Time images_from_{};             // earlier ones are not used
+  Time sweeps_from_{};             // earlier ones are used when the velocity is known
+  std::vector<PointXYZI> seen_W_;  // points of the last sweep
 
   std::optional<LegKinematics> kinematics_;
   ContactEstimator contacts_;

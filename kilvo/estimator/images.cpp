@@ -19,7 +19,7 @@ constexpr double new_scale = 0.4, new_angle = 0.25;
 constexpr int enough = 20;
 
 bool is_new_view(const Track& track) {
-  const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(track.A.determinant()))));
+  const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(track.warp.A.determinant()))));
   return octaves > new_scale || track.view_angle > new_angle;
 }
 
@@ -90,9 +90,7 @@ void Estimator::process(const CameraImage& image) {
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::camera)].used;
   trajectory_.correct(image.t, estimate_->x.pose(), estimate_->x.v - prior.x.v);
   const SE3 T_WI = estimate_->x.pose();
-  if (!weak_.isZero(0) && model.report().used >= enough)
-    map_error_.seen(T_WI, model.by_frame(), weak_, last_seen_from_ ? (T_WI.p - *last_seen_from_).norm() : 0);
-  last_seen_from_ = T_WI.p;
+  if (!weak_.isZero(0) && model.report().used >= enough) note_drift(model.by_frame(), T_WI);
   learn_from(model, tracks, pyramid, depth, prior);
   settle(*estimate_);
   last_image_ = image.t;
@@ -100,6 +98,16 @@ void Estimator::process(const CameraImage& image) {
   seen.coloured = colours_of(image.image, estimate_->x.tau, *camera_, T_CI_ * estimate_->x.pose().inverse(), depth);
   seen.indicators = indicators_of(model.report().used);
   seen.stages.visual_us = watch.lap_us();
+}
+
+// Along what no sweep knows the pose is wrong by what the frames are that it was held against.
+void Estimator::note_drift(std::span<const PhotometricModel::FrameShare> shares, const SE3& T_WI) {
+  std::vector<MapError::View> views;
+  for (const auto& [frame, weight] : shares) {
+    const VisualFrame& from = visual_map_.frame(frame);
+    views.push_back({from.error, (T_WI.p - (from.T_CW.inverse() * T_CI_).p).norm(), weight});
+  }
+  map_error_.seen(T_WI, views, weak_);
 }
 
 // Patches are found within some pixels of where they are expected. Along what the LiDAR does not see the way is the images' own: it may be
@@ -150,7 +158,7 @@ void Estimator::learn_from(const PhotometricModel& model, std::span<const Track>
   VisualFrame frame;
   frame.T_CW = T_CW;
   frame.tau = estimate_->x.tau;
-  frame.epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
+  frame.error = map_error_.total(T_WI, estimate_->P.topLeftCorner<6, 6>());
   // Along what the LiDAR does not know, the error of this frame is that of the next ones: drift, which the epoch carries.
   const PoseCovariance own = to_origin(T_WI) * known;
   frame.noise.topLeftCorner<6, 6>() = own * prior.P.topLeftCorner<6, 6>() * own.transpose();
@@ -160,7 +168,7 @@ void Estimator::learn_from(const PhotometricModel& model, std::span<const Track>
     const Eigen::Vector2f stored = pixel.cast<float>();
     const auto patch = cut_patch(pyramid, stored.cast<double>());
     if (!patch) return std::nullopt;
-    return Observation{id, stored, 1.0F, *patch};
+    return Observation{.frame = id, .pixel = stored, .patch = *patch};
   };
   // A point is not denied by an image that agrees with few others either.
   const bool is_good = 2 * model.report().used > model.report().tracks;

@@ -43,10 +43,14 @@ PoseCovariance MapError::at(const SE3& T_WI) const {
   return G * now_ * G.transpose();
 }
 
+PoseCovariance MapError::total(const SE3& T_WI, const PoseCovariance& P) const {
+  const PoseCovariance G = to_origin(T_WI);
+  return G * P * G.transpose() + now_;
+}
+
 std::uint32_t MapError::epoch_now(const SE3& T_WI, const PoseCovariance& P) {
   const PoseCovariance total = P + at(T_WI);
   const PoseCovariance here = from_origin(T_WI);
-  // Sweeps and images take turns, each as sure as it is.
   constexpr std::size_t recent = 4;
   for (std::size_t k = epochs_.size(), tried = 0; k-- > 0 && tried < recent; ++tried) {
     const PoseCovariance then = here * epochs_[k] * here.transpose();
@@ -86,21 +90,23 @@ void MapError::registered_to_given(const SE3& T_WI, std::span<const EpochInforma
   now_ = H * (inverse * systematic * inverse + weak * at(T_WI) * weak.transpose()) * H.transpose();
 }
 
-void MapError::seen(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak, double travelled) {
+void MapError::seen(const SE3& T_WI, std::span<const View> views, const PoseCovariance& weak) {
   double all = 0;
-  for (const EpochInformation& e : epochs) all += e.A.bottomRightCorner<3, 3>().trace();
+  for (const View& view : views) all += view.weight;
   if (!(all > 0)) return;
   const PoseCovariance G = from_origin(T_WI);
-  PoseCovariance views = PoseCovariance::Zero();
-  for (const EpochInformation& e : epochs) views += (e.A.bottomRightCorner<3, 3>().trace() / all) * G * epochs_[e.epoch] * G.transpose();
-  // Each metre is wrong by the same share, so that standard deviations add.
-  const PoseCovariance before = at(T_WI);
-  const double sigma = std::sqrt(std::max(0.0, (weak * before * weak.transpose()).bottomRightCorner<3, 3>().trace())),
-               more = scale_error * travelled;
-  views.bottomRightCorner<3, 3>().diagonal().array() += (2 * sigma + more) * more;
-  const PoseCovariance known = PoseCovariance::Identity() - weak;
+  PoseCovariance sum = PoseCovariance::Zero();
+  for (const View& view : views) {
+    PoseCovariance error = G * view.error * G.transpose();
+    // Each metre is wrong by the same share, so that standard deviations add.
+    const double sigma = std::sqrt(std::max(0.0, (weak * error * weak.transpose()).bottomRightCorner<3, 3>().trace())),
+                 more = scale_error * view.distance;
+    error.bottomRightCorner<3, 3>().diagonal().array() += (2 * sigma + more) * more;
+    sum += (view.weight / all) * error;
+  }
+  const PoseCovariance known = PoseCovariance::Identity() - weak, before = at(T_WI);
   const PoseCovariance H = to_origin(T_WI);
-  now_ = H * (known * before * known.transpose() + weak * views * weak.transpose()) * H.transpose();
+  now_ = H * (known * before * known.transpose() + weak * sum * weak.transpose()) * H.transpose();
 }
 
 }  // namespace kilvo

@@ -30,9 +30,17 @@ class MapError {
   void registered_to_given(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic,
                            const PoseCovariance& weak);
 
-  /// An image was held against views of these epochs, `travelled` metres after the last one. Along `weak`, which no sweep knows, D becomes
-  /// what the views are wrong by.
-  void seen(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak, double travelled);
+  /// P + D as a twist at the world's origin.
+  PoseCovariance total(const SE3& T_WI, const PoseCovariance& P) const;
+
+  /// A view that an image was held against.
+  struct View {
+    PoseCovariance error;  // total() when it was taken
+    double distance;       // from there, m
+    double weight;
+  };
+  /// Along `weak`, which no sweep knows, D becomes what the views are wrong by, and what the way from there adds.
+  void seen(const SE3& T_WI, std::span<const View> views, const PoseCovariance& weak);
 
  private:
   std::vector<PoseCovariance> epochs_;           // as twists at the world's origin

@@ -41,6 +41,7 @@ LegStep leg_at(Duration since) {
 // IMU at 200 Hz and legs at 1 kHz for so long; the legs a little beside the IMU, or none.
 Replay recorded(Duration length, Duration beside = microseconds(0), bool with_legs = true) {
   EstimatorConfig config;
+  config.legs.gate = 50;  // these feet slide
   Replay replay(config);
   for (Duration t{}; t <= length; t += milliseconds(5)) replay.add(imu_at(t));
   for (Duration t = milliseconds(1); with_legs && t <= length; t += milliseconds(1)) {

@@ -12,10 +12,10 @@ struct LegConfig {
   double touchdown_speed = 0.06;           // share of the robot's swing speed
   double impact_drop = 0.62;               // share of the speed before
   double settling = 0.1;                   // s
-  double velocity_sigma = 0.01;            // m/s
+  double velocity_sigma = 0.005;           // m/s
   double vertical_velocity_sigma = 0.025;  // m/s
   double velocity_correlation = 0.2;       // s
-  double position_sigma = 0.001;           // m
+  double position_sigma = 0.0005;          // m
   double position_correlation = 0.5;       // s
   double ground_sigma = 0.02;              // m
   double entry_delay = 0.015;              // s

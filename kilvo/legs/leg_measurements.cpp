@@ -12,6 +12,8 @@ namespace {
 constexpr double rolling_speed = 0.005;
 // alpha_s of Eq. 8, of the standard deviation.
 constexpr double loosest = 10;
+// Soles settle and roll: by so much more, in variance, a foot may move before it is refused.
+constexpr double settling = 20;
 // Refused for so long, a foot has another place.
 constexpr Duration longest_refusal = std::chrono::milliseconds(20);
 // Encoders that repeat every bit for so long, while the other foot's do not and the body turns faster than this (rad/s), are frozen.
@@ -69,10 +71,10 @@ bool LegModel::moves(const Covariance& prior, std::size_t side, const Eigen::Vec
   const int pc = at::pcl + 3 * static_cast<int>(side);
   const double gate2 = config_.gate * config_.gate;
   Eigen::Matrix3d S = prior.block<3, 3>(at::v, at::v);
-  S.diagonal().array() += loosest * config_.velocity_sigma * config_.velocity_sigma;
+  S.diagonal().array() += settling * config_.velocity_sigma * config_.velocity_sigma;
   if (velocity.dot(S.llt().solve(velocity)) > gate2) return true;
   S = prior.block<3, 3>(at::p, at::p) + prior.block<3, 3>(pc, pc) - prior.block<3, 3>(at::p, pc) - prior.block<3, 3>(pc, at::p);
-  S.diagonal().array() += loosest * config_.position_sigma * config_.position_sigma;
+  S.diagonal().array() += settling * config_.position_sigma * config_.position_sigma;
   return offset.dot(S.llt().solve(offset)) > gate2;
 }
 

@@ -26,8 +26,9 @@ struct Patch {
 
 struct VisualFrame {
   SE3 T_CW;
-  double tau = 1;           // inverse exposure
-  std::uint32_t epoch = 0;  // of the map's pose error (VoxelMap::insert)
+  double tau = 1;  // inverse exposure
+  /// What the whole pose is wrong by, with the drift that images share: a covariance as `noise` is.
+  Eigen::Matrix<double, 6, 6> error = Eigen::Matrix<double, 6, 6>::Zero();
   /// Covariance of what is this frame's own in the error of (rotation, position, tau): the pose as a twist of the world at its origin.
   Eigen::Matrix<double, 7, 7> noise = Eigen::Matrix<double, 7, 7>::Zero();
   std::uint32_t observations = 0;  // that refer to it

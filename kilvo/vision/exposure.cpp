@@ -18,8 +18,8 @@ std::pair<Values, double> PhotometricModel::as_first_seen(std::size_t i, const S
   if (tracks_[i].observation != point.observations[0]) {
     const Observation& first = map_.observation(point.observations[0]);
     const VisualFrame& frame = map_.frame(first.frame);
-    const auto A = affine_between(camera_, T_CW, frame.T_CW, point.p_W, point.normal_W.cast<double>());
-    if (const auto old = A ? warp(first, *A, level_) : std::nullopt) return {old->value, frame.tau};
+    const auto plane = warp_between(camera_, T_CW, frame.T_CW, point.p_W, point.normal_W.cast<double>());
+    if (const auto old = plane ? warp(first, *plane, level_) : std::nullopt) return {old->value, frame.tau};
   }
   return {p.patch->value, p.tau};
 }

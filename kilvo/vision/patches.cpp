@@ -60,24 +60,31 @@ float corner_of(const GreyImage& image, int x, int y) {
   return (0.5F * (a + c) - std::sqrt(0.25F * (a - c) * (a - c) + b * b)) / (4.0F * 4 * reach * reach);
 }
 
-std::optional<Template> warp(const Observation& from, const Eigen::Matrix2d& A, int level) {
-  const double scale = std::sqrt(std::abs(A.determinant())) * (1 << level);  // pixels of level 0 of the patch by a pixel of the view
+std::optional<Template> warp(const Observation& from, const PlaneWarp& plane, int level) {
+  const double scale = std::sqrt(std::abs(plane.A.determinant())) * (1 << level);  // pixels of level 0 of the patch by a pixel of the view
   const int source = std::clamp(static_cast<int>(std::lround(std::log2(std::max(scale, 1e-3)))), 0, from.patch.levels_cut - 1);
   const double relative = scale / (1 << source);
   if (!(relative < largest_scale && relative > smallest_scale)) return std::nullopt;
   const Eigen::Vector2f centre = corner_at(from.pixel.cast<double>(), source).centre.cast<float>();
-  const Eigen::Matrix2f step = (A * (static_cast<double>(1 << level) / (1 << source))).cast<float>();
+  const Eigen::Matrix2f step = (plane.A * (static_cast<double>(1 << level) / (1 << source))).cast<float>();
+  const Eigen::Vector2f c = (plane.c * (1 << level)).cast<float>();
   // One pixel more on each side, for the gradient.
   constexpr int wide = Template::size + 2;
   const float reach = half + 1;
-  const Eigen::Vector2f extent = reach * (step.col(0).cwiseAbs() + step.col(1).cwiseAbs());
+  constexpr float most = 0.3F;
+  const float nearest = 1 - reach * (std::abs(c.x()) + std::abs(c.y()));
+  if (nearest < most) return std::nullopt;
+  const Eigen::Vector2f extent = reach / nearest * (step.col(0).cwiseAbs() + step.col(1).cwiseAbs());
   if (((centre - extent).array() < 0).any() || ((centre + extent).array() > Patch::size - 1.001F).any()) return std::nullopt;
   const auto& pixels = from.patch.pixels[static_cast<std::size_t>(source)];
   std::array<float, wide * wide> values;
   for (int j = 0; j < wide; ++j) {
-    Eigen::Vector2f at = centre - reach * step.col(0) + (static_cast<float>(j) - reach) * step.col(1);
-    for (int i = 0; i < wide; ++i, at += step.col(0))
+    const float y = static_cast<float>(j) - reach;
+    for (int i = 0; i < wide; ++i) {
+      const float x = static_cast<float>(i) - reach;
+      const Eigen::Vector2f at = centre + (x * step.col(0) + y * step.col(1)) / (1 + c.x() * x + c.y() * y);
       values[static_cast<std::size_t>(j * wide + i)] = sample(pixels.data(), Patch::size, at.x(), at.y());
+    }
   }
   Template out;
   for (int j = 0; j < Template::size; ++j) {

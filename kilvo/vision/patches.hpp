@@ -26,9 +26,16 @@ struct Template {
   std::array<float, count> value, dx, dy;
 };
 
-/// The patch seen through `A` (pixels of the patch's image by pixels of the view, both of level 0), at a level of the view; from the level
-/// of the patch that is nearest in scale. None when the scales do not fit, or the patch is too small.
-std::optional<Template> warp(const Observation& from, const Eigen::Matrix2d& A, int level);
+/// How the picture of a plane changes between two views, about a point of it: what is d pixels beside the point in one view is
+/// A d / (1 + c'd) beside it in the other, both of level 0. Without c, patches of a wall along which a robot walks seem to move too far.
+struct PlaneWarp {
+  Eigen::Matrix2d A = Eigen::Matrix2d::Identity();
+  Eigen::Vector2d c = Eigen::Vector2d::Zero();  // 1/px
+};
+
+/// The patch as a view should show it, at a level of the view; from the level of the patch that is nearest in scale. None when the scales
+/// do not fit, or the patch is too small.
+std::optional<Template> warp(const Observation& from, const PlaneWarp& plane, int level);
 
 /// The 8x8 pixels of a view around a pixel of its own level, which must be at least 5 px within.
 void sample_patch(const GreyImage& image, const Eigen::Vector2f& centre, std::array<float, Template::count>& out);

@@ -92,7 +92,8 @@ PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, c
 void PhotometricModel::prepare(int level) {
   if (level == level_) return;
   level_ = level;
-  for (std::size_t i = 0; i < tracks_.size(); ++i) prepared_[i].patch = warp(map_.observation(tracks_[i].observation), tracks_[i].A, level);
+  for (std::size_t i = 0; i < tracks_.size(); ++i)
+    prepared_[i].patch = warp(map_.observation(tracks_[i].observation), tracks_[i].warp, level);
 }
 
 PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x) {
@@ -239,7 +240,7 @@ Information<7> PhotometricModel::operator()(const State& x, const Covariance& pr
     total.b += group.info.b;
     total.chi2 += group.info.chi2;
     total.rows += group.info.rows;
-    by_frame_.push_back({frame.epoch, group.info.A.topLeftCorner<6, 6>()});
+    by_frame_.push_back({group.frame, group.info.A.block<3, 3>(3, 3).trace()});
   }
   report_.used = total.rows;
   return total;

@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "kilvo/filter/epoch_information.hpp"
 #include "kilvo/filter/measurement_rows.hpp"
 #include "kilvo/map/visual_map.hpp"
 #include "kilvo/vision/brightness.hpp"
@@ -50,6 +49,12 @@ class PhotometricModel {
 
   Information<7> operator()(const State& x, const Covariance& prior);
 
+  /// How much of what is known of the position comes from the patches of one frame.
+  struct FrameShare {
+    std::uint32_t frame = 0;
+    double weight = 0;  // 1/m^2
+  };
+
   /// What one frame's patches say of a turn of the body, before any was refused for being found elsewhere than expected.
   struct Turn {
     std::uint32_t frame = 0;
@@ -68,7 +73,7 @@ class PhotometricModel {
   // Of the last evaluation:
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
   const Report& report() const { return report_; }
-  const std::vector<EpochInformation>& by_frame() const { return by_frame_; }
+  const std::vector<FrameShare>& by_frame() const { return by_frame_; }
 
  private:
   struct Prepared {
@@ -120,7 +125,7 @@ class PhotometricModel {
     Information<7> info;
   };
   std::vector<Group> groups_;
-  std::vector<EpochInformation> by_frame_;
+  std::vector<FrameShare> by_frame_;
   std::vector<Turn> turns_;
 };
 

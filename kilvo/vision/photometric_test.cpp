@@ -35,7 +35,7 @@ class Photometric : public testing::Test {
     const auto points_W = scene_.points();
     for (const NewPoint& found : new_points(surfaces_, camera_, T_CW, pyramid[0], DepthView(camera_, T_CW, points_W), {}, config_)) {
       if (const auto patch = cut_patch(pyramid, found.pixel))
-        map_.insert(found.point, Observation{id, found.pixel.cast<float>(), 1, *patch});
+        map_.insert(found.point, Observation{.frame = id, .pixel = found.pixel.cast<float>(), .patch = *patch});
     }
   }
 

@@ -64,15 +64,15 @@ bool choose_observation(const View& view, const VisualPoint& p, Track& track) {
   }
   if (best >= 1e9) return false;
   const SE3& T_RW = view.map.frame(view.map.observation(track.observation).frame).T_CW;
-  const auto A = affine_between(view.camera, view.T_CW, T_RW, p.p_W, p.normal_W.cast<double>());
-  if (A) track.A = *A;
-  return A.has_value();
+  const auto warp = warp_between(view.camera, view.T_CW, T_RW, p.p_W, p.normal_W.cast<double>());
+  if (warp) track.warp = *warp;
+  return warp.has_value();
 }
 
 }  // namespace
 
-std::optional<Eigen::Matrix2d> affine_between(const Camera& camera, const SE3& T_CW, const SE3& T_RW, const Eigen::Vector3d& p_W,
-                                              const Eigen::Vector3d& n_W) {
+std::optional<PlaneWarp> warp_between(const Camera& camera, const SE3& T_CW, const SE3& T_RW, const Eigen::Vector3d& p_W,
+                                      const Eigen::Vector3d& n_W) {
   const auto here = camera.project_with_jacobian(T_CW * p_W), there = camera.project_with_jacobian(T_RW * p_W);
   if (!here || !there) return std::nullopt;
   Eigen::Matrix<double, 3, 2> along;  // the plane
@@ -81,7 +81,18 @@ std::optional<Eigen::Matrix2d> affine_between(const Camera& camera, const SE3& T
   const Eigen::Matrix2d B = here->J * T_CW.R.matrix() * along;
   constexpr double edge_on = 1e-3;  // px^2/m^2
   if (std::abs(B.determinant()) < edge_on) return std::nullopt;
-  return Eigen::Matrix2d(there->J * T_RW.R.matrix() * along * B.inverse());
+  PlaneWarp out;
+  out.A = there->J * T_RW.R.matrix() * along * B.inverse();
+  // How deep the plane lies in the other view, over how deep in this one, by the pixel of this one.
+  const Eigen::Vector3d p_C = T_CW * p_W, p_R = T_RW * p_W;
+  constexpr double flat = 0.1;  // of a wide lens: beyond it depth says little
+  if (p_C.z() < flat * p_C.norm() || p_R.z() < flat * p_R.norm()) return out;
+  const SE3 T_RC = T_RW * T_CW.inverse();
+  const Eigen::Vector3d n_C = T_CW.R * n_W;
+  const Eigen::Vector3d ratio_by_ray = T_RC.R.matrix().row(2).transpose() + n_C * (T_RC.p.z() / n_C.dot(p_C));
+  const Eigen::Matrix2d ray_by_pixel = (here->J.leftCols<2>() * p_C.z()).inverse();
+  out.c = ray_by_pixel.transpose() * ratio_by_ray.head<2>() * (p_C.z() / p_R.z());
+  return out;
 }
 
 std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,

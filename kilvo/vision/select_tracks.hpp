@@ -9,6 +9,7 @@
 #include "kilvo/map/visual_map.hpp"
 #include "kilvo/vision/camera.hpp"
 #include "kilvo/vision/depth_view.hpp"
+#include "kilvo/vision/patches.hpp"
 #include "kilvo/vision/vision_config.hpp"
 
 namespace kilvo {
@@ -17,7 +18,7 @@ struct Track {
   std::uint32_t point = 0;
   std::uint32_t observation = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // where it is expected
-  Eigen::Matrix2d A = Eigen::Matrix2d::Identity();  // pixels of the observation's image by pixels of this one
+  PlaneWarp warp;                                   // from this image to the observation's
   bool plain = false;                               // without corners: how bright it is says what the exposure is, no more
   double view_angle = 0;                            // between the two views of the point, rad
 };
@@ -45,9 +46,9 @@ inline constexpr std::size_t plenty_of_corners = 24;
 std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,
                                  const VisionConfig& config);
 
-/// How the plane through p_W with normal n_W maps from the image at T_CW to that at T_RW, at the point: pixels by pixels. None where either
-/// does not see it.
-std::optional<Eigen::Matrix2d> affine_between(const Camera& camera, const SE3& T_CW, const SE3& T_RW, const Eigen::Vector3d& p_W,
-                                              const Eigen::Vector3d& n_W);
+/// How the plane through p_W with normal n_W maps from the image at T_CW to that at T_RW, about the point. None where either does not see
+/// it.
+std::optional<PlaneWarp> warp_between(const Camera& camera, const SE3& T_CW, const SE3& T_RW, const Eigen::Vector3d& p_W,
+                                      const Eigen::Vector3d& n_W);
 
 }  // namespace kilvo

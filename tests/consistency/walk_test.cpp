@@ -83,8 +83,12 @@ class Walk {
   Samples estimated_by_rigid_legs() const {
     EstimatorConfig config = settings_.estimator;
     const LegDensity density = leg_density(simulator_->config());
+    config.legs.velocity_sigma = 0.01;  // what counts is its square by the correlation time
     config.legs.velocity_correlation = density.across / square(config.legs.velocity_sigma);
     config.legs.vertical_velocity_sigma = std::sqrt(density.vertical / config.legs.velocity_correlation);
+    // Where a foot is tells once more how fast it has been.
+    config.legs.position_sigma = 0.001;
+    config.noise.foot = 0.01;
     Estimator estimator(settings_.robot, config, {true, true, false, false});
     return samples_of(estimator);
   }
