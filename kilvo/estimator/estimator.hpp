@@ -88,6 +88,7 @@ class Estimator {
   void keep_a_foothold(const LegStep& step, const std::array<bool, 2>& passed);
 
   // switching.cpp: which sensors are used, and how they come back
+  void doubt_velocity();
   void choose_modality(Time t);
   void lose_imu(std::vector<Output>& out);
   void bridge(Time silent_since, std::vector<Output>& out);

@@ -14,7 +14,7 @@ namespace {
 constexpr double well_known_position = 0.08, well_known_rotation = 0.03;
 // The grid: what a registration starting from its points can reach.
 constexpr double step = 0.25, yaw_step = 0.09;  // m, rad
-constexpr int most_steps = 4, most_steps_up = 2, most_steps_yaw = 5;
+constexpr int most_steps = 8, most_steps_up = 2, most_steps_yaw = 5;
 constexpr std::size_t probe_count = 160;  // clusters that are looked up for each pose of the grid
 constexpr std::size_t finalists = 12;
 constexpr double near_surface = 0.08, per_metre = 0.02;  // m

@@ -51,6 +51,14 @@ void Estimator::choose_modality(Time t) {
     }
   }
   modality_ = now;
+  if (now == Modality::coast && pending_.empty()) doubt_velocity();
+}
+
+// What has failed may have been wrong before it was missed, and nothing will tell.
+void Estimator::doubt_velocity() {
+  constexpr double sigma = 0.003;  // m/s
+  for (Estimate* e : {&*estimate_, &closed_}) e->P.diagonal().segment<3>(at::v).array() += sigma * sigma;
+  settle(closed_);
 }
 
 // Said at once, on the last output's heels; from then on there is no pose.
