@@ -141,11 +141,15 @@ class Run {
     return interrupted;
   }
 
-  // The first message of the legs shows whether it is of the robot in the configuration.
+  // The first messages of the legs show whether they are of the robot in the configuration. Hands and heads may speak on the same topic.
   void require_legs(const Measurement& m) {
+    constexpr int patience = 20;  // messages
     const auto* joints = std::get_if<JointSample>(&m);
-    if (joints == nullptr || joints->position.empty() || std::exchange(legs_seen_, true)) return;
-    if (const auto why = estimator_.mismatch(*joints)) throw lab::ConfigError(fmt::format("{}: {}", facts_.config_file, *why));
+    if (joints == nullptr || joints->position.empty() || legs_seen_) return;
+    const auto why = estimator_.mismatch(*joints);
+    legs_seen_ = !why;
+    if (why && ++foreign_legs_ == patience)
+      throw lab::ConfigError(fmt::format("{}: {} (topic {})", facts_.config_file, *why, source_.topic(Sensor::legs)));
   }
 
   void keep(std::vector<Output> outputs) {
@@ -202,6 +206,7 @@ class Run {
   ResultFiles files_;
   Progress progress_;
   bool legs_seen_ = false;
+  int foreign_legs_ = 0;
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "apps/cli/summary.hpp"
 
 #include <cmath>
+#include <fmt/core.h>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -134,7 +135,13 @@ std::vector<std::string> all_warnings(const RunFacts& facts, const lab::Recordin
   std::vector<std::string> out = facts.warnings;
   for (const std::string& text : source.warnings()) out.push_back(text);
   out.insert(out.end(), statistics.warnings.begin(), statistics.warnings.end());
-  if (facts.live) out.insert(out.end(), facts.live->warnings.begin(), facts.live->warnings.end());
+  if (facts.live) {
+    out.insert(out.end(), facts.live->warnings.begin(), facts.live->warnings.end());
+    for (const Sensor s : facts.sensors) {
+      if (const auto given_up = facts.live->dropped[static_cast<std::size_t>(s)]; given_up > 0)
+        out.push_back(fmt::format("live: {} messages of {} were given up: this machine was too slow for them", given_up, name_of(s)));
+    }
+  }
   return out;
 }
 

@@ -159,7 +159,12 @@ void Health::watch_imu(const Measurement& m) {
   }
   Tracker& tracker = trackers_[m.index()];
   if (!tracker.heard_since_imu) tracker.heard_since_imu = tracker.stamp;
-  imu_silence_ = std::max(imu_silence_, std::min(1.0, to_seconds(*tracker.stamp - *tracker.heard_since_imu)));
+  // What is older than the newest IMU sample has come late, unless its clock is another.
+  constexpr Duration another_clock = std::chrono::seconds(1);
+  Time since = *tracker.heard_since_imu;
+  const auto& imu = trackers_[static_cast<std::size_t>(Sensor::imu)].stamp;
+  if (imu && *imu > since && *imu - since < another_clock) since = *imu;
+  imu_silence_ = std::max(imu_silence_, std::min(1.0, to_seconds(*tracker.stamp - since)));
 }
 
 const char* Health::judge(const Measurement& m) {

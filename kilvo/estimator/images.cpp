@@ -50,6 +50,7 @@ const char* Estimator::image_fault(const CameraImage& image) {
 }
 
 void Estimator::process(const CameraImage& image) {
+  if (mount_is_doubted_) return drop(Sensor::camera, "not mounted as configured");
   if (image.t < anchor_.t) return drop(Sensor::camera, "before the state");
   if (replay_.is_blind(image.t, image.t)) return drop(Sensor::camera, "no IMU");
   if (image.t < images_from_) return drop(Sensor::camera, "before the motion is known");
@@ -93,7 +94,7 @@ void Estimator::process(const CameraImage& image) {
   if (!weak_.isZero(0) && model.report().used >= enough) note_drift(model.by_frame(), T_WI);
   learn_from(model, tracks, pyramid, depth, prior);
   settle(*estimate_);
-  last_image_ = image.t;
+  if (model.report().used > 0) last_image_ = image.t;
   Output& seen = images_.emplace_back();
   seen.coloured = colours_of(image.image, estimate_->x.tau, *camera_, T_CI_ * estimate_->x.pose().inverse(), depth);
   seen.indicators = indicators_of(model.report().used);
@@ -144,10 +145,10 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI) {
     return text;
   };
   const Eigen::Vector3d degrees = *psi * (180 / M_PI);
-  statistics_.warnings.push_back(
-      "the images fit a camera that is turned by " + tenths(degrees.norm()) + " degrees or more (" + tenths(degrees.x()) + ", " +
-      tenths(degrees.y()) + ", " + tenths(degrees.z()) +
-      " about the axes of the IMU) against camera.T_imu_camera.R: is the calibration that of this robot, and camera.time_offset right?");
+  statistics_.warnings.push_back("the images fit a camera that is turned by " + tenths(degrees.norm()) + " degrees or more (" +
+                                 tenths(degrees.x()) + ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()) +
+                                 " about the axes of the IMU) against camera.T_imu_camera.R: is the calibration that of this robot, and "
+                                 "camera.time_offset right? Images are not used any more");
 }
 
 void Estimator::learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,

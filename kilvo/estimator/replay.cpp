@@ -29,6 +29,15 @@ void Replay::say_clipped(ImuInterval& interval) const {
   interval.accel_scale = accel * accel * correlation / (config_.noise.accel * config_.noise.accel);
 }
 
+// No body turns or is pushed so much otherwise within one sample: one of the two is wrong, or hardly anything is known of what was between.
+void Replay::say_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
+  constexpr double gyro = 3, accel = 100;  // rad/s, m/s^2
+  const double dt = to_seconds(b.t - a.t), turned = (b.gyro - a.gyro).norm(), pushed = (b.accel - a.accel).norm();
+  const auto scale = [dt](double jump, double noise) { return jump * jump * dt / (noise * noise); };
+  if (turned > gyro) interval.gyro_scale = std::max(interval.gyro_scale, scale(turned, config_.noise.gyro));
+  if (pushed > accel) interval.accel_scale = std::max(interval.accel_scale, scale(pushed, config_.noise.accel));
+}
+
 bool Replay::is_blind(Time begin, Time end) const {
   auto next = std::upper_bound(imu_.begin(), imu_.end(), begin, [](Time t, const ImuSample& s) { return t < s.t; });
   for (; next != imu_.end(); ++next) {
@@ -44,6 +53,7 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   const double gap = to_seconds(b.t - a.t);
   if (gap <= config_.max_imu_gap) {
     if (is_clipped(a, b)) say_clipped(interval);
+    say_jump(interval, a, b);
     return interval;
   }
   // What was missed is about what varied before, constant over the gap: as a density, times the gap.

@@ -58,6 +58,7 @@ class Replay {
 
  private:
   static constexpr std::size_t most_remembered = 100;
+  void say_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
   void say_clipped(ImuInterval& interval) const;
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
   std::optional<Eigen::Vector3d> gyro_at(Time t) const;  // none within a gap

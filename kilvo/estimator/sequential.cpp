@@ -97,6 +97,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   replay_.advance(ahead, end, &trajectory_);
   if (end < sweeps_from_ && has_no_shape(prior)) return drop(Sensor::lidar, "before the motion is known");
   const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
+  if (points.empty()) return drop(Sensor::lidar, "no usable point");
   const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size, config_.lidar.reach());
   const Eigen::Vector3d p_IL = robot_.lidar.T_imu_lidar.p;
   LidarConfig lidar = config_.lidar;

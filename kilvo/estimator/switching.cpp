@@ -47,7 +47,12 @@ void Estimator::choose_modality(Time t) {
     } else if (legs != has_legs(modality_)) {
       cause_ = legs ? "legs are back" : health_.is_frozen(Sensor::legs) ? "legs frozen" : "legs lost";
     } else {
-      cause_ = camera ? "images are used" : health_.is_frozen(Sensor::camera) ? "camera frozen" : "camera lost";
+      const auto heard = health_.heard(Sensor::camera);
+      const bool silent = !heard || t - *heard > silence(robot_.camera.rate, 3, std::chrono::milliseconds(300));
+      cause_ = camera                              ? "images are used"
+               : health_.is_frozen(Sensor::camera) ? "camera frozen"
+               : silent                            ? "camera lost"
+                                                   : "images tell nothing";
     }
   }
   modality_ = now;

@@ -64,7 +64,7 @@ std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajec
   out.reserve(scan.points.size());
   for (const LidarPoint& p : scan.points) {
     const float range2 = p.x * p.x + p.y * p.y + p.z * p.z;
-    if (!std::isfinite(range2) || !std::isfinite(p.intensity)) {
+    if (!std::isfinite(range2)) {
       ++drops.non_finite;
       continue;
     }
@@ -84,7 +84,7 @@ std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajec
     const Eigen::Vector4f a = A.col(0) * p.x + A.col(1) * p.y + A.col(2) * p.z + A.col(3);
     const Eigen::Vector4f b = B.col(0) * p.x + B.col(1) * p.y + B.col(2) * p.z + B.col(3);
     PointXYZI& x = out.emplace_back(a + s * (b - a));
-    x[3] = p.intensity;
+    x[3] = std::isfinite(p.intensity) ? p.intensity : 0;  // a place is good without it
   }
   return out;
 }

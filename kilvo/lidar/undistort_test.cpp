@@ -133,10 +133,11 @@ TEST(Undistort, WhatIsNoPointIsDroppedAndCountedByCause) {
                  {4, 5, 6, 7, 500'000'000}};
   PointDrops drops;
   const auto points = undistort(scan, at_rest(), scan.t, LidarMount{}, drops);
-  ASSERT_EQ(points.size(), 2U);
+  ASSERT_EQ(points.size(), 3U);
   EXPECT_EQ(points[0], PointXYZI(1, 2, 3, 4));
-  EXPECT_EQ(points[1], PointXYZI(4, 5, 6, 7));
-  EXPECT_EQ(drops.non_finite, 6U);
+  EXPECT_EQ(points[1], PointXYZI(1, 2, 3, 0)) << "a place without an intensity";
+  EXPECT_EQ(points[2], PointXYZI(4, 5, 6, 7));
+  EXPECT_EQ(drops.non_finite, 5U);
   EXPECT_EQ(drops.at_origin, 2U);
   EXPECT_EQ(drops.too_near, 1U);
   EXPECT_EQ(drops.too_far, 1U);

@@ -21,6 +21,8 @@ constexpr std::uintmax_t most_bytes = 16 << 20;
 std::string read_file(const fs::path& path, const std::string& what) {
   std::error_code error;
   if (!fs::exists(path, error)) throw ConfigError(fmt::format("{}: no such {}", path.string(), what));
+  if (!fs::is_regular_file(path, error) && !fs::is_directory(path, error))
+    throw ConfigError(fmt::format("{}: not a file that a {} could be read from", path.string(), what));
   if (fs::is_directory(path, error)) throw ConfigError(fmt::format("{}: a folder, not a {}", path.string(), what));
   std::ifstream in(path, std::ios::binary);
   if (!in) throw ConfigError(fmt::format("{}: cannot be read", path.string()));

@@ -111,6 +111,15 @@ TEST_F(Faults, FrozenSensorsAreLost) {
   EXPECT_LT(imu.worst(&Moment::sigmas, 6, 14), 4.0);
 }
 
+// A spike that a body could hardly do but an IMU can say: half a degree and more, within one sample.
+TEST_F(Faults, OneWrongSampleOfTheImuIsOutlived) {
+  for (const double amount : {3.0, 10.0}) {
+    const Outcome o = with({{FailureKind::noise, Sensor::imu, 6, 6.004, amount}});
+    say("one wrong IMU sample", o, 6, 14);
+    EXPECT_LT(o.worst(&Moment::error, 7, 14), 0.02) << amount;
+  }
+}
+
 TEST_F(Faults, AClockAheadOfTheImuIsMeasuredAndItsSensorNotUsed) {
   for (const Sensor sensor : {Sensor::lidar, Sensor::legs}) {
     const Outcome o = with({{FailureKind::time_jump, sensor, 0, for_ever, 0.3}});
