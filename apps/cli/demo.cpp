@@ -67,7 +67,9 @@ void add_demo(CLI::App& program, Action& chosen) {
   auto options = std::make_shared<DemoOptions>();
   CLI::App* verb = program.add_subcommand("demo", "simulate a walk through a room, run on it, compare with the truth");
   verb->add_option("--out", options->out, "folder for everything; default: demo")->type_name("DIR");
-  verb->add_option("--seed", options->seed, "of the simulated noise; default: 1")->type_name("N");
+  verb->add_option("--seed", options->seed, "of the simulated noise; default: 1")
+      ->type_name("N")
+      ->check(CLI::Range(std::int64_t{0}, std::int64_t{1'000'000'000}));
   verb->add_option("--duration", options->duration, "of the walk; default: 30")->type_name("S");
   verb->add_flag("--quiet", options->quiet, "no progress");
   verb->callback([options, &chosen] { chosen = [options] { return demo(*options); }; });

@@ -23,7 +23,9 @@ void add_simulate(CLI::App& program, Action& chosen) {
   CLI::App* verb = program.add_subcommand("simulate", "walk a simulated humanoid and record its sensors, with the truth");
   verb->add_option("SCENARIO", options->scenario, "which walk, see below")->required();
   verb->add_option("--out", *out, "folder for the recording and the truth, created if need be")->type_name("DIR")->required();
-  verb->add_option("--seed", options->seed, "of furniture, textures and noise; default: 1")->type_name("N");
+  verb->add_option("--seed", options->seed, "of furniture, textures and noise; default: 1")
+      ->type_name("N")
+      ->check(CLI::Range(std::int64_t{0}, std::int64_t{1'000'000'000}));
   verb->add_option("--duration", options->duration, "end after so many seconds; default: when the walk ends")->type_name("S");
   verb->add_option("--stride", options->stride, "every step so many times as long; default: 1")->type_name("X");
   verb->add_flag("--quiet", options->quiet, "no progress, only errors");
