@@ -109,7 +109,7 @@ RunFiles read_run_files(const fs::path& folder) {
   const fs::path full = fs::weakly_canonical(folder, error);
   run.name = (full.has_filename() ? full.filename() : full.parent_path().filename()).string();
   run.odometry = read_tum(folder / "odometry.tum");
-  if (run.odometry.empty()) throw ReportError((folder / "odometry.tum").string() + ": has no pose in it");
+  if (run.odometry.empty()) run.missing.emplace_back("odometry.tum (no pose in it)");
   run.summary = nlohmann::ordered_json::object();
   const auto read = [&](const char* name, auto& into, auto&& reader) {
     if (fs::exists(folder / name, error))

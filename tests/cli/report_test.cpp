@@ -156,7 +156,9 @@ TEST_F(Report, WhatIsNotThereIsLeftOutWithAWord) {
   EXPECT_THAT(figures_of(p), UnorderedElementsAre("path_top", "path_side", "rates", "intervals"));
   EXPECT_THAT(p.dom, AllOf(HasSubstr("Not in the folder, so not shown: "), HasSubstr("no truth was given")));
   write_text(results("odometry.tum"), "");
-  EXPECT_EQ(report().code, 0);
+  const Finished empty = report();
+  EXPECT_EQ(empty.code, 0);
+  EXPECT_THAT(empty.err, HasSubstr("no pose in it"));
   EXPECT_THAT(figures_of(opened()), UnorderedElementsAre());
 }
 
