@@ -4,15 +4,12 @@
 #include <cmath>
 
 namespace kilvo {
-namespace {
 
 double median_of(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
-
-}  // namespace
 
 double Brightness::doubt(double other) const {
   const double d = (other - log) / spread;

@@ -5,6 +5,9 @@
 
 namespace kilvo {
 
+/// The upper one of two in the middle. Of at least one value.
+double median_of(std::vector<double> values);
+
 /// Logarithms of brightness ratios, most of which differ by little; the others show something else, and how far off they are says nothing.
 /// The maximum of their likelihood with tails of inverse squares: a median follows when a third of them lie on one side, and those along
 /// the way a robot goes do.

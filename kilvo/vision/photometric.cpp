@@ -18,12 +18,6 @@ constexpr double border = 5;
 // An expected error of so many pixels is within reach of the finest level; twice that of the next.
 constexpr double reach = 0.7;
 
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // The plane may have been found to lie elsewhere since the observation was made: its patch shows what lies on its own ray.
 Eigen::Vector3d on_own_ray(const Camera& camera, const Observation& o, const VisualFrame& frame, const VisualPoint& point) {
   const auto ray = camera.unproject(o.pixel.cast<double>());
@@ -82,7 +76,7 @@ PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, c
     p.slide_W = ray / point.normal_W.cast<double>().dot(ray);
     if (const auto view = view_of(camera, T_CI, prior.x.pose(), p.p_W)) spread2.push_back((view->J * P * view->J.transpose()).trace());
   }
-  const double spread = spread2.empty() ? 0 : std::sqrt(median_of(spread2));
+  const double spread = spread2.empty() ? 0 : std::sqrt(median_of(std::move(spread2)));
   int coarsest = 0;
   while (coarsest + 1 < std::min<int>(Patch::levels, static_cast<int>(pyramid.size())) && spread > reach * (1 << coarsest)) ++coarsest;
   for (int level = coarsest; level >= 0; --level) schedule_.push_back(level);
@@ -217,7 +211,7 @@ Information<7> PhotometricModel::operator()(const State& x, const Covariance& pr
     if (!parts[i].valid && prepared_[i].patch && !prepared_[i].plain && !parts[i].sums.saturated) ++report_.unlike;
   }
   // Noise of the pixels that nobody configured: of the whole image.
-  const double scale2 = ratios.empty() ? 1 : std::max(1.0, median_of(ratios));
+  const double scale2 = ratios.empty() ? 1 : std::max(1.0, median_of(std::move(ratios)));
   report_.noise = std::sqrt(scale2);
   groups_.clear();
   const Brightness common = brightness.empty() ? Brightness{} : brightness_of(std::move(brightness));
