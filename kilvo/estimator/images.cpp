@@ -131,7 +131,6 @@ bool Estimator::says_nothing(const PhotometricModel::Report& report) {
 }
 
 void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI) {
-  if (mount_is_doubted_) return;
   for (const PhotometricModel::Turn& turn : model.turns()) {
     const SO3 R_IW = T_CI_.R.inverse() * visual_map_.frame(turn.frame).T_CW.R;
     mount_check_.add(R_WI, R_IW.inverse(), turn.A, turn.b);

@@ -13,7 +13,7 @@ constexpr double rolling_speed = 0.005;
 // alpha_s of Eq. 8, of the standard deviation.
 constexpr double loosest = 10;
 // Soles settle and roll: by so much more, in variance, a foot may move before it is refused.
-constexpr double settling = 20;
+constexpr double room_to_settle = 20;
 // Refused for so long, a foot has another place.
 constexpr Duration longest_refusal = std::chrono::milliseconds(20);
 // Encoders that repeat every bit for so long, while the other foot's do not and the body turns faster than this (rad/s), are frozen.
@@ -65,16 +65,16 @@ FootHeightRow foot_height(const GroundPatch& ground, const Eigen::Vector3d& pc) 
   return {ground.height_of(pc), ground.normal.transpose()};
 }
 
-// The chi-square gate, velocity and position each by itself, as they are and not as densities: is this foot moving, has it moved? With
-// the variance that Eq. 8 allows at most: a foot's own looseness would let everything pass.
+// The chi-square gate, velocity and position each by itself, as they are and not as densities: is this foot moving, has it moved? Not
+// with the looseness of Eq. 8, which grows with the speed and would let everything pass.
 bool LegModel::moves(const Covariance& prior, std::size_t side, const Eigen::Vector3d& velocity, const Eigen::Vector3d& offset) const {
   const int pc = at::pcl + 3 * static_cast<int>(side);
   const double gate2 = config_.gate * config_.gate;
   Eigen::Matrix3d S = prior.block<3, 3>(at::v, at::v);
-  S.diagonal().array() += settling * config_.velocity_sigma * config_.velocity_sigma;
+  S.diagonal().array() += room_to_settle * config_.velocity_sigma * config_.velocity_sigma;
   if (velocity.dot(S.llt().solve(velocity)) > gate2) return true;
   S = prior.block<3, 3>(at::p, at::p) + prior.block<3, 3>(pc, pc) - prior.block<3, 3>(at::p, pc) - prior.block<3, 3>(pc, at::p);
-  S.diagonal().array() += settling * config_.position_sigma * config_.position_sigma;
+  S.diagonal().array() += room_to_settle * config_.position_sigma * config_.position_sigma;
   return offset.dot(S.llt().solve(offset)) > gate2;
 }
 

@@ -11,7 +11,7 @@ namespace {
 constexpr float bright = 245;
 // What is to be as bright as this is not looked at: if it were refused for being found too bright, those found too dark would remain.
 constexpr float expected_bright = 235;
-constexpr float seen_bright = 252;
+constexpr float seen_bright = 252;  // whatever was expected: it shows nothing more
 
 struct Sums {
   float xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top, top_seen;

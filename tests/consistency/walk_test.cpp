@@ -91,7 +91,7 @@ class Walk {
   Samples estimated_by_rigid_legs() const {
     EstimatorConfig config = settings_.estimator;
     const LegDensity density = leg_density(simulator_->config());
-    config.legs.velocity_sigma = 0.01;  // what counts is its square by the correlation time
+    config.legs.velocity_sigma = 0.01;  // the density below is of any; Eq. 8 loosens feet that move faster than it
     config.legs.velocity_correlation = density.across / square(config.legs.velocity_sigma);
     config.legs.vertical_velocity_sigma = std::sqrt(density.vertical / config.legs.velocity_correlation);
     // Where a foot is tells once more how fast it has been.
