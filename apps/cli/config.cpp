@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "apps/cli/exit_code.hpp"
+#include "apps/cli/make_estimator.hpp"
 #include "apps/cli/sensor_choice.hpp"
 #include "apps/cli/shipped_config.hpp"
 #include "apps/cli/verbs.hpp"
@@ -29,6 +30,7 @@ int check(const ConfigOptions& options) {
   if (!settings.has(Sensor::imu))
     throw lab::ConfigError(fmt::format("{}: imu.topic is missing: nothing is estimated without an IMU", options.file));
   lab::require_complete(settings, configured);
+  make_estimator(settings, configured);  // whatever a run would find fault with
   fmt::print("{}: good: {}\n", options.file, names);
   return done;
 }

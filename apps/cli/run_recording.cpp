@@ -6,6 +6,7 @@
 
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/interrupt.hpp"
+#include "apps/cli/make_estimator.hpp"
 #include "apps/cli/map_keeper.hpp"
 #include "apps/cli/output_folder.hpp"
 #include "apps/cli/pace.hpp"
@@ -43,27 +44,12 @@ lab::RecordingOptions recording_options(const RunOptions& options, const lab::Se
   return out;
 }
 
-std::array<bool, sensor_count> as_flags(const std::vector<Sensor>& sensors) {
-  std::array<bool, sensor_count> out{};
-  for (const Sensor s : sensors) out[static_cast<std::size_t>(s)] = true;
-  return out;
-}
-
 void tell_start(const RunFacts& facts, const lab::RecordingSource& source, bool no_deskew) {
   fmt::print(stderr, "kilvo: configuration {}\n", facts.config_file);
   for (const Sensor sensor : facts.sensors) {
     std::string detail;
     if (sensor == Sensor::lidar) detail = no_deskew ? ", each cloud taken at its stamp" : ", point time: " + source.point_time().text();
     fmt::print(stderr, "kilvo: {} from {}{}\n", name_of(sensor), source.topic(sensor), detail);
-  }
-}
-
-Estimator make_estimator(const lab::Settings& settings, const std::vector<Sensor>& used) {
-  try {
-    return {settings.robot, settings.estimator, as_flags(used)};
-  } catch (const std::invalid_argument& error) {
-    const std::string why = error.what();
-    throw lab::ConfigError(why.starts_with("robot.urdf") ? fmt::format("{}: {}", settings.urdf_file, why) : why);
   }
 }
 

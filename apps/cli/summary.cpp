@@ -68,8 +68,9 @@ Json health_json(const RunFacts& facts, const Statistics& statistics) {
   return out;
 }
 
-Json recovery_json(const Statistics& statistics) {
+Json recovery_json(const Statistics& statistics, std::uint64_t live_steps) {
   return {{"imu_outages", statistics.imu_outages},
+          {"clock_steps", statistics.clock_steps + live_steps},
           {"searches", statistics.searches},
           {"found", statistics.found},
           {"maps_begun_anew", statistics.maps_begun_anew}};
@@ -156,7 +157,7 @@ std::string summary_json(const RunFacts& facts, const lab::Settings& settings, c
   json["input_damaged"] = source.input_damaged();
   json["messages"] = messages_json(facts, source, statistics);
   json["health"] = health_json(facts, statistics);
-  json["recovery"] = recovery_json(statistics);
+  json["recovery"] = recovery_json(statistics, facts.live ? facts.live->clock_steps : 0);
   json["degraded"] = recap.degraded;
   json["points"] = points_json(facts, source, statistics);
   json["warnings"] = all_warnings(facts, source, statistics);

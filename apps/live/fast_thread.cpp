@@ -39,7 +39,7 @@ void LiveRunner::run_fast() {
 void LiveRunner::take(const Sample& sample) {
   Forerunner& runner = forks_.front().runner;
   if (sample.is_imu) {
-    keep(sample.imu, fast_raw_);
+    fast_raw_.keep(sample.imu);
     if (runner.push(sample.imu)) emit(sample.at);
     return;
   }
@@ -52,15 +52,20 @@ void LiveRunner::take(const Sample& sample) {
   const auto known = fast_kinematics_->feet(sample.joints);
   const auto* feet = std::get_if<Feet>(&known);
   if (feet == nullptr) return;
-  keep(*feet, fast_raw_);
-  if (runner.push(*feet)) emit(sample.at);
+  fast_raw_.keep(*feet);
+  const bool is_due = last_output_ && runner.started() && !lost_ && feet->t > newest_legs_;
+  newest_legs_ = std::max(newest_legs_, feet->t);
+  legs_heard_ += is_due ? 1 : 0;
+  if (!runner.push(*feet)) return;
+  ++legs_answered_;
+  emit(sample.at);
 }
 
 // The estimator's newest state, with what came since.
 void LiveRunner::take_over() {
   if (!forks_.fetch()) return;
   Fork& fork = forks_.front();
-  catch_up(fork.runner, fast_raw_);
+  fast_raw_.catch_up(fork.runner);
   if (fork.corrected) statistics_.correction.add(seconds_since(*fork.corrected));
   // That there is no pose any more is said once.
   if (fork.runner.imu_lost() && !std::exchange(lost_, true)) emit(Clock::now());

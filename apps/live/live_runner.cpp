@@ -1,5 +1,6 @@
 #include "apps/live/live_runner.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "apps/live/raw.hpp"
@@ -44,7 +45,10 @@ void LiveRunner::push(Measurement m) {
   const auto* imu = std::get_if<ImuSample>(&m);
   const auto* joints = std::get_if<JointSample>(&m);
   const auto s = static_cast<std::size_t>(sensor_of(m));
-  if (used_[s] && (imu != nullptr || joints != nullptr)) {
+  // What is not to be used the estimator sees as well, and counts.
+  const bool usable = used_[s] && clock_steps_.follow(m) == nullptr;
+  note_clock_steps();
+  if (usable && (imu != nullptr || joints != nullptr)) {
     if (Sample* slot = samples_.vacant()) {
       slot->is_imu = imu != nullptr;
       if (imu != nullptr) slot->imu = *imu;
@@ -58,6 +62,15 @@ void LiveRunner::push(Measurement m) {
   }
   ++pushed_;
   backlog_.push({std::move(m), now});
+}
+
+void LiveRunner::note_clock_steps() {
+  if (clock_steps_.count() == statistics_.clock_steps) return;
+  statistics_.clock_steps = clock_steps_.count();
+  constexpr std::uint64_t most = 10;
+  if (clock_steps_.count() > most) return;
+  warn("the IMU's clock went back by " + std::to_string(std::lround(1e3 * to_seconds(clock_steps_.last()))) +
+       " ms: the outputs' stamps go on as if it had not");
 }
 
 bool LiveRunner::is_idle() const {
@@ -87,6 +100,12 @@ void LiveRunner::end() {
   const auto given_up = backlog_.dropped();
   for (std::size_t s = 0; s < sensor_count; ++s) statistics_.dropped[s] += given_up[s] + not_taken_[s];
   statistics_.dropped_outputs += slow_outputs_dropped_;
+  constexpr double most = 0.9;
+  const bool all_taken = statistics_.dropped[static_cast<std::size_t>(Sensor::legs)] == 0;
+  if (all_taken && static_cast<double>(legs_answered_) < most * static_cast<double>(legs_heard_)) {
+    warn("only " + std::to_string(legs_answered_) + " of " + std::to_string(legs_heard_) +
+         " leg samples were answered at once: IMU and legs do not come together");
+  }
   statistics_.deepest["slow"] = backlog_.deepest();
 }
 
@@ -141,11 +160,11 @@ void LiveRunner::answer(std::vector<Output>& outputs, Clock::time_point since) {
 }
 
 void LiveRunner::keep_raw(const Measurement& m) {
-  if (const auto* imu = std::get_if<ImuSample>(&m)) keep(*imu, slow_raw_);
+  if (const auto* imu = std::get_if<ImuSample>(&m)) slow_raw_.keep(*imu);
   const auto* joints = std::get_if<JointSample>(&m);
   if (joints == nullptr || !slow_kinematics_ || fault_of(*joints) != nullptr) return;
   const auto known = slow_kinematics_->feet(*joints);
-  if (const auto* feet = std::get_if<Feet>(&known)) keep(*feet, slow_raw_);
+  if (const auto* feet = std::get_if<Feet>(&known)) slow_raw_.keep(*feet);
 }
 
 // Sweeps and images; the states in between are the fast thread's. True when there was one.
@@ -170,7 +189,7 @@ void LiveRunner::hand_over(std::optional<Clock::time_point> corrected) {
   Fork& fork = forks_.back();
   if (!estimator_.fork(fork.runner)) return;
   fork.corrected = corrected;
-  catch_up(fork.runner, slow_raw_);
+  slow_raw_.catch_up(fork.runner);
   forks_.publish();
   for_fast_.post();
 }

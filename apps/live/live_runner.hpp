@@ -33,6 +33,7 @@ struct LiveStatistics {
   std::uint64_t dropped_outputs = 0;                  // that nobody carried away in time
   std::map<std::string, std::size_t> deepest;         // queue -> most that waited in it
   std::map<std::string, double> cpu_seconds;          // thread -> time
+  std::uint64_t clock_steps = 0;                      // the IMU's time went back for good
   std::vector<std::string> warnings;
 };
 
@@ -82,6 +83,7 @@ class LiveRunner {
     std::optional<Clock::time_point> corrected;  // when the message arrived that completed a sweep or image; none of others
   };
 
+  void note_clock_steps();
   // The fast thread.
   void run_fast();
   void take(const Sample& sample);
@@ -107,6 +109,7 @@ class LiveRunner {
 
   std::mutex pushing_;                                   // of those who push; the fast thread never asks for it
   std::array<std::uint64_t, sensor_count> not_taken_{};  // samples that the fast thread had no room for
+  ClockSteps clock_steps_;                               // before both threads, so that they agree
   Backlog backlog_;
   Ring<Sample> samples_;
   Signal for_fast_, for_output_;
@@ -122,12 +125,14 @@ class LiveRunner {
 
   // Of the fast thread:
   std::optional<LegKinematics> fast_kinematics_;
-  Recent<Raw> fast_raw_;
+  RawSamples fast_raw_;
+  std::uint64_t legs_heard_ = 0, legs_answered_ = 0;  // since the first output, while there is a pose
+  Time newest_legs_ = Time::min();
   std::optional<Time> last_output_;
   bool lost_ = false;
   // Of the slow thread:
   std::optional<LegKinematics> slow_kinematics_;
-  Recent<Raw> slow_raw_;
+  RawSamples slow_raw_;
   std::optional<Time> last_fork_;
   std::optional<Modality> last_modality_;
   Clock::time_point told_{};

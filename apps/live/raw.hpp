@@ -1,6 +1,7 @@
 // The last samples of IMU and legs, with which each thread brings a forerunner up to date.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <variant>
 
@@ -9,21 +10,42 @@
 
 namespace kilvo::live {
 
-using Raw = std::variant<ImuSample, Feet>;
+class RawSamples {
+ public:
+  /// In the order of their arrival.
+  void keep(const ImuSample& s) {
+    newest_imu_ = s.t;
+    add(s);
+  }
+  void keep(const Feet& s) {
+    // The most of lately: it is smallest just before an IMU sample.
+    const Duration lag = newest_imu_ == Time::min() ? Duration(0) : newest_imu_ - s.t;
+    lag_ -= lag_ / 4096;
+    if (lag < longest_lag) lag_ = std::max(lag_, lag);
+    add(s);
+  }
 
-inline constexpr std::size_t most_raw = 8192;
+  /// What `runner` does not know yet; what no later one will need is forgotten.
+  void catch_up(Forerunner& runner) {
+    const auto stamp = [](const Raw& raw) { return std::visit([](const auto& s) { return s.t; }, raw); };
+    const Time known = runner.known();
+    while (!all_.empty() && stamp(*all_.begin()) < known) all_.pop_front();
+    runner.expect_legs_after(lag_);
+    for (const Raw& raw : all_) std::visit([&runner](const auto& s) { runner.push(s); }, raw);
+  }
 
-inline void keep(const Raw& raw, Recent<Raw>& all) {
-  if (all.size() >= most_raw) all.pop_front();
-  all.push_back(raw);
-}
+ private:
+  using Raw = std::variant<ImuSample, Feet>;
+  static constexpr std::size_t most = 8192;
+  static constexpr Duration longest_lag = std::chrono::milliseconds(250);  // more is a wrong stamp, or of no use at all
+  void add(const Raw& raw) {
+    if (all_.size() >= most) all_.pop_front();
+    all_.push_back(raw);
+  }
 
-/// What `runner` does not know yet; what no later one will need is forgotten.
-inline void catch_up(Forerunner& runner, Recent<Raw>& all) {
-  const auto stamp = [](const Raw& raw) { return std::visit([](const auto& s) { return s.t; }, raw); };
-  const Time known = runner.known();
-  while (!all.empty() && stamp(*all.begin()) < known) all.pop_front();
-  for (const Raw& raw : all) std::visit([&runner](const auto& s) { runner.push(s); }, raw);
-}
+  Recent<Raw> all_;
+  Time newest_imu_ = Time::min();
+  Duration lag_{};  // by which the leg samples' stamps trail the IMU's as they arrive
+};
 
 }  // namespace kilvo::live

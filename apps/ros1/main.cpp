@@ -1,13 +1,17 @@
 // kilvo_node: KILVO for ROS 1.
 #include <charconv>
 #include <csignal>
+#include <cstdlib>
 #include <ctime>
 #include <exception>
 #include <fmt/core.h>
+#include <optional>
 #include <ros/init.h>
 #include <ros/master.h>
 #include <ros/node_handle.h>
+#include <stop_token>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -93,6 +97,21 @@ bool wait_for_master(const StopSignals& stop) {
   return true;
 }
 
+/// While ROS tries again and again to reach a master that has gone in the middle of the start, nobody asks for signals: the program ends
+/// here and now.
+class StartWatch {
+ public:
+  explicit StartWatch(const StopSignals& stop)
+      : thread_([&stop](const std::stop_token& started) {
+          while (!started.stop_requested()) {
+            if (stop.came_within(50'000'000)) std::_Exit(done);
+          }
+        }) {}
+
+ private:
+  std::jthread thread_;
+};
+
 lab::Settings load(const ros1::Parameters& parameters) {
   lab::Settings settings = lab::load_settings(parameters.config, parameters.overrides);
   std::vector<Sensor> used;
@@ -113,11 +132,13 @@ int run(int argc, char** argv) {
   CommandLine words(argc, argv);
   words.init_ros();
   if (!wait_for_master(stop)) return done;
+  std::optional<StartWatch> start(stop);
   ros::NodeHandle node, own("~");
   words.set_parameters(own);
   const ros1::Parameters parameters = ros1::read_parameters(own);
   {
     ros1::Node kilvo(parameters, load(parameters));
+    start.reset();
     while (ros::ok() && !stop.came_within(100'000'000)) kilvo.tick();
   }
   ros::shutdown();

@@ -19,7 +19,7 @@ struct Names {
   std::string odom_frame = "odom";  // the smooth one's (REP 105)
   std::string base_frame = "base_link";
   std::string odometry = "~odometry", smooth = "~odometry_smooth", path = "~path", cloud = "~cloud", coloured = "~cloud_coloured",
-              contacts = "~contacts";
+              contacts = "~contacts", ground = "~ground";
 };
 
 struct Parameters {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <geometry_msgs/PoseArray.h>
 #include <memory>
 #include <nav_msgs/Odometry.h>
 #include <nav_msgs/Path.h>
@@ -35,6 +36,7 @@ using OdometryMessage = nav_msgs::Odometry_<RosAllocator>;
 using PathMessage = nav_msgs::Path_<RosAllocator>;
 using PoseStamped = geometry_msgs::PoseStamped_<RosAllocator>;
 using Pose = geometry_msgs::Pose_<RosAllocator>;
+using PosesMessage = geometry_msgs::PoseArray_<RosAllocator>;
 using TransformStamped = geometry_msgs::TransformStamped_<RosAllocator>;
 using TransformsMessage = tf2_msgs::TFMessage_<RosAllocator>;
 using CloudMessage = sensor_msgs::PointCloud2_<RosAllocator>;

@@ -55,6 +55,7 @@ StateOutlet::StateOutlet(const Parameters& parameters, const lab::Settings& sett
   odometry_ = node.advertise<OdometryMessage>(ros::names::resolve(names_.odometry), most_unsent);
   smooth_odometry_ = node.advertise<OdometryMessage>(ros::names::resolve(names_.smooth), most_unsent);
   contacts_ = node.advertise<JointMessage>(ros::names::resolve(names_.contacts), most_unsent);
+  ground_ = node.advertise<PosesMessage>(ros::names::resolve(names_.ground), 100);
   path_ = node.advertise<PathMessage>(ros::names::resolve(names_.path), 1, true);  // who comes late gets the last one
   transforms_ = node.advertise<TransformsMessage>("/tf", 100);
   address(way_.header, Time{}, names_.map_frame);
@@ -68,6 +69,7 @@ void StateOutlet::take(const Output& output) {
   publish(odometry_, best, output.t, names_.map_frame);
   publish(smooth_odometry_, smooth, output.t, names_.odom_frame);
   if (output.contacts && contacts_.getNumSubscribers() > 0) publish_contacts(*output.contacts);
+  if (output.contacts && ground_.getNumSubscribers() > 0) publish_ground(*output.contacts);
   if (!last_tf_ || output.t - *last_tf_ >= tf_period_) {
     last_tf_ = output.t;
     publish_transforms(best, smooth, output.t);
@@ -127,6 +129,20 @@ void StateOutlet::publish_contacts(const Contacts& contacts) {
   contacts_.publish(message);
 }
 
+// One pose for each foot: where it stands or stood last; its z axis is the ground's normal.
+void StateOutlet::publish_ground(const Contacts& contacts) {
+  if (last_ground_ && contacts.t - *last_ground_ < tf_period_) return;
+  last_ground_ = contacts.t;
+  PosesMessage message;
+  address(message.header, contacts.t, names_.map_frame);
+  for (const GroundPatch& patch : contacts.ground) {
+    Pose& pose = message.poses.emplace_back();
+    copy_into(pose.position, patch.point);
+    copy_into(pose.orientation, Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), patch.normal));
+  }
+  ground_.publish(message);
+}
+
 void StateOutlet::extend_path(const BodyMotion& best, Time t) {
   if (last_path_ && t - *last_path_ < path_period) return;
   last_path_ = t;
@@ -166,6 +182,7 @@ std::optional<EstimateState> StateOutlet::newest() const {
 void StateOutlet::clear() {
   smooth_ = SmoothOdometry(smooth_time_);
   last_tf_.reset();
+  last_ground_.reset();
   last_path_.reset();
   const std::lock_guard lock(mutex_);
   newest_.reset();

@@ -1,4 +1,4 @@
-// Each state, as it comes, to who listens: odometry, transforms, contacts; and the way so far.
+// Each state, as it comes, to who listens: odometry, transforms, contacts, the ground; and the way so far.
 #pragma once
 
 #include <mutex>
@@ -44,6 +44,7 @@ class StateOutlet {
   void publish(const ros::Publisher& publisher, const BodyMotion& motion, Time t, const std::string& frame) const;
   void publish_transforms(const BodyMotion& best, const BodyMotion& smooth, Time t);
   void publish_contacts(const Contacts& contacts);
+  void publish_ground(const Contacts& contacts);
   void extend_path(const BodyMotion& best, Time t);
 
   Names names_;
@@ -52,9 +53,9 @@ class StateOutlet {
   double smooth_time_;
   Duration tf_period_;
   std::array<std::string, 2> feet_;
-  ros::Publisher odometry_, smooth_odometry_, transforms_, contacts_, path_;
+  ros::Publisher odometry_, smooth_odometry_, transforms_, contacts_, ground_, path_;
   SmoothOdometry smooth_;
-  std::optional<Time> last_tf_, last_path_;
+  std::optional<Time> last_tf_, last_ground_, last_path_;
 
   mutable std::mutex mutex_;
   std::optional<EstimateState> newest_;

@@ -48,8 +48,8 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
 // On the legs alone, or beside a LiDAR that is blind one way, a wrong velocity makes standing feet look as if they moved, so that they are
 // not used, and nothing mends it. No flight lasts this long: the velocity is taken as unknown, and the feet as standing.
 void Estimator::keep_a_foothold(const LegStep& step, const std::array<bool, 2>& passed) {
-  constexpr Duration longest_flight = std::chrono::milliseconds(500);
   const bool mended = modality_ != Modality::ki && weak_.isZero(0);
+  if (passed[0] || passed[1]) last_foothold_ = step.t;
   if (passed[0] || passed[1] || mended) last_stance_ = step.t;
   if (step.t - last_stance_ < longest_flight) return;
   constexpr double unknown_velocity = 1.0;  // m/s

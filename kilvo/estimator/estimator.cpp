@@ -68,7 +68,10 @@ std::vector<Output> Estimator::push(Measurement m) {
 void Estimator::push(Measurement m, std::vector<Output>& out) {
   const Sensor s = sensor_of(m);
   if (!used_[static_cast<std::size_t>(s)]) return drop(s, "not used");
+  const char* back = clock_steps_.follow(m);  // whatever it says, it has a time
+  if (clock_steps_.count() > statistics_.clock_steps) note_clock_step();
   if (const char* fault = fault_of(m)) return drop(s, fault);
+  if (back != nullptr) return drop(s, back);
   if (const char* fault = health_.judge(m)) return drop(s, fault);
   if (health_.imu_silence() > blind_gap) lose_imu(out);
   if (const auto refused = timeline_.push(std::move(m))) return drop(s, *refused);
@@ -113,6 +116,10 @@ void Estimator::warn_of_unused_sensors() {
   if (statistics_.unsupported > few && 2 * statistics_.unsupported > legs) {
     statistics_.warnings.push_back("legs: no foot seemed to stand still in " + std::to_string(100 * statistics_.unsupported / legs) +
                                    " % of the messages: is the mount of the IMU right, and the URDF this robot's?");
+  }
+  if (statistics_.maps_begun_anew > 0) {
+    statistics_.warnings.push_back("the map was begun anew " + std::to_string(statistics_.maps_begun_anew) +
+                                   " times, because sweeps had fitted nowhere: poses before and after do not belong together");
   }
   for (int i = 0; i < sensor_count; ++i) {
     const SensorCount& sensor = statistics_.sensors[static_cast<std::size_t>(i)];

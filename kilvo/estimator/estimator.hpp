@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "kilvo/estimator/clock_steps.hpp"
 #include "kilvo/estimator/config.hpp"
 #include "kilvo/estimator/initialise.hpp"
 #include "kilvo/estimator/map_error.hpp"
@@ -101,6 +102,7 @@ class Estimator {
   void refuse_sweep(Time t);
   void note_outage(Time sweep_begin);
   void warn_of_streams();
+  void note_clock_step();
 
   // sequential.cpp: sweeps
   void process_pending(Time until, std::vector<Output>& out);
@@ -112,13 +114,16 @@ class Estimator {
 
   // images.cpp
   const char* image_fault(const CameraImage& image);
+  std::optional<SE3> camera_from_state(Time image) const;
   void process(const CameraImage& image);
   void note_drift(std::span<const PhotometricModel::FrameShare> shares, const SE3& T_WI);
+  PoseCovariance doubt_of_way(std::span<const PhotometricModel::FrameShare> shares, const SE3& T_WI) const;
+  Eigen::Vector3d position_of(const VisualFrame& frame) const;
   bool is_lost_among_patches(const Estimate& prior) const;
   bool says_nothing(const PhotometricModel::Report& report);
   void check_mount(const PhotometricModel& model, const SO3& R_WI);
-  void learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid, const DepthView& depth,
-                  const Estimate& prior);
+  void learn_from(const SE3& T_CI, const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,
+                  const DepthView& depth, const Estimate& prior);
 
   Robot robot_;
   EstimatorConfig config_;
@@ -157,15 +162,18 @@ class Estimator {
   std::optional<LegKinematics> kinematics_;
   ContactEstimator contacts_;
   StanceTracker stances_;
-  std::optional<Time> last_legs_;   // while the legs are used
-  double leg_period_ = 0;           // between the last two leg samples, s
-  double closing_us_ = 0;           // what it took to close the IMU's intervals since the last leg sample
-  Time last_stance_{};              // when a foot was used last
-  Time last_sweep_{};               // end of the last sweep, or the start
-  Time last_middle_{};              // of the last sweep
-  std::optional<Time> last_image_;  // that was used
+  std::optional<Time> last_legs_;                           // while the legs are used
+  double leg_period_ = 0;                                   // between the last two leg samples, s
+  double closing_us_ = 0;                                   // what it took to close the IMU's intervals since the last leg sample
+  Time last_foothold_{};                                    // when a foot was used last
+  Time last_stance_{};                                      // the same, or since when that is waited for
+  Time last_sweep_{};                                       // end of the last sweep, or the start
+  Time last_middle_{};                                      // of the last sweep
+  std::optional<Time> last_image_;                          // that was used
+  Eigen::Vector3d last_image_p_ = Eigen::Vector3d::Zero();  // m
   Modality modality_ = Modality::coast;
   const char* cause_ = "start";
+  ClockSteps clock_steps_;
   Health health_;
   Calm calm_;
   Recovery recovery_;

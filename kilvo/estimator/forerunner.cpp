@@ -25,6 +25,14 @@ void Forerunner::close(Time until) {
   if (last_legs_ && *last_legs_ > now_.t) replay_.advance(now_, *last_legs_, nullptr);
 }
 
+// The estimator will say so as well, once it has stopped waiting for them.
+void Forerunner::miss_legs() {
+  last_legs_.reset();
+  if (!has_legs(modality_)) return;
+  modality_ = without_legs(modality_);
+  cause_ = "legs lost";
+}
+
 // What is not finite goes nowhere: it is silent until the estimator, which throws such a state away, is forked again.
 bool Forerunner::keep_finite() {
   started_ = is_finite(now_);
@@ -39,6 +47,7 @@ bool Forerunner::push(const ImuSample& raw) {
   ImuSample s = raw;
   s.accel *= accel_scale_;
   replay_.add(s);
+  if (last_legs_ && s.t - *last_legs_ - lag_ > silence_of_legs(leg_rate_)) miss_legs();
   if (last_legs_ && !are_legs_overdue(s.t - *last_legs_ - lag_, leg_rate_, leg_period_)) return false;
   close(s.t);
   with_legs_ = false;
@@ -47,8 +56,6 @@ bool Forerunner::push(const ImuSample& raw) {
 
 bool Forerunner::push(const Feet& feet) {
   if (!started_ || imu_lost_) return false;
-  // The most of lately: it is smallest just before an IMU sample.
-  lag_ = std::max(lag_ - lag_ / 256, replay_.newest_imu().t - feet.t);
   if (!last_legs_ || feet.t <= *last_legs_ || feet.t < closed_.t) return false;
   if (to_seconds(feet.t - replay_.newest_imu().t) > longest_held_imu(imu_rate_)) return false;
   if (feet.t - *last_legs_ > silence_of_legs(leg_rate_)) {

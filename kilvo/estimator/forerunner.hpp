@@ -23,6 +23,9 @@ class Forerunner {
   bool push(const ImuSample& s);
   bool push(const Feet& feet);
 
+  /// By how much the leg samples' stamps trail the IMU's as they arrive: for so long the IMU alone carries no outputs.
+  void expect_legs_after(Duration lag) { lag_ = lag; }
+
   /// Of the newest state; its time never goes back within one value, but may against another's.
   Output output() const;
 
@@ -35,6 +38,7 @@ class Forerunner {
  private:
   friend class Estimator;  // fills it
   void close(Time until);
+  void miss_legs();
   bool keep_finite();
 
   // Of the robot, never changed:
@@ -54,7 +58,7 @@ class Forerunner {
   const char* cause_ = "start";
   PoseCovariance map_error_ = PoseCovariance::Zero();
 
-  Duration lag_{};                            // by which the leg samples' stamps trail the IMU's as they arrive
+  Duration lag_{};                            // see expect_legs_after
   bool with_legs_ = false;                    // the newest output is of a leg sample
   double kinematic_us_ = 0, contact_us_ = 0;  // what that took
 };

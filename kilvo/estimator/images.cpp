@@ -49,9 +49,20 @@ const char* Estimator::image_fault(const CameraImage& image) {
   return picture.pixels.size() == values ? nullptr : "cut short";
 }
 
+// Where the camera was when the image was taken, seen from the IMU at the time of the state that it updates. That is the image's own time,
+// unless a sweep of a later time was there first: then the motion between the two is the trajectory's. None when that is too long ago.
+std::optional<SE3> Estimator::camera_from_state(Time image) const {
+  constexpr Duration longest = std::chrono::milliseconds(300);
+  if (image >= anchor_.t) return T_CI_;
+  const auto then = trajectory_.at(image), now = trajectory_.at(anchor_.t);
+  if (!then || !now || anchor_.t - image > longest) return std::nullopt;
+  return T_CI_ * then->inverse() * *now;
+}
+
 void Estimator::process(const CameraImage& image) {
   if (mount_is_doubted_) return drop(Sensor::camera, "not mounted as configured");
-  if (image.t < anchor_.t) return drop(Sensor::camera, "before the state");
+  const std::optional<SE3> T_CI = camera_from_state(image.t);
+  if (!T_CI) return drop(Sensor::camera, "before the state");
   if (replay_.is_blind(image.t, image.t)) return drop(Sensor::camera, "no IMU");
   if (image.t < images_from_) return drop(Sensor::camera, "before the motion is known");
   if (seen_W_.empty()) return drop(Sensor::camera, "before the first sweep");
@@ -61,13 +72,14 @@ void Estimator::process(const CameraImage& image) {
   if (recovery_.sweeps_to_go > 0) return drop(Sensor::camera, "before the map is joined again");
   Stopwatch watch;
   const std::vector<GreyImage> pyramid = pyramid_of(to_grey(image.image), Patch::levels);
-  Estimate prior = replay_.nearest(image.t, anchor_);
-  replay_.advance(prior, image.t, &trajectory_);
+  const Time at = std::max(image.t, anchor_.t);
+  Estimate prior = replay_.nearest(at, anchor_);
+  replay_.advance(prior, at, &trajectory_);
   if (is_lost_among_patches(prior)) return drop(Sensor::camera, "the pose is too uncertain");
-  const SE3 expected = T_CI_ * prior.x.pose().inverse();
+  const SE3 expected = *T_CI * prior.x.pose().inverse();
   const DepthView depth(*camera_, expected, seen_W_);
   const std::vector<Track> tracks = select_tracks(visual_map_, *camera_, expected, depth, config_.vision);
-  PhotometricModel model(visual_map_, *camera_, T_CI_, pyramid, tracks, prior, config_.vision);
+  PhotometricModel model(visual_map_, *camera_, *T_CI, pyramid, tracks, prior, config_.vision);
   const Estimate unlit = prior;
   if (const auto exposure = model.exposure_at(prior.x)) {
     // Lamps are switched and exposures jump: what it was says nothing, the image all.
@@ -80,33 +92,64 @@ void Estimator::process(const CameraImage& image) {
   UpdateConfig update_config = config_.update;
   update_config.min_iterations = model.iterations();
   update_config.max_iterations = std::max(update_config.max_iterations, model.iterations() + 2);
-  estimate_ = tracks.empty() ? prior : update(prior, model, update_config).posterior;
+  const bool blind = !weak_.isZero(0), feet_hold = blind && last_legs_ && image.t - last_foothold_ < longest_flight;
+  const auto measured = [&](const State& x, const Covariance& P) {
+    Information<7> info = model(x, P);
+    if (feet_hold) {
+      Eigen::Matrix<double, 7, 7> common = Eigen::Matrix<double, 7, 7>::Zero();
+      common.topLeftCorner<6, 6>() = doubt_of_way(model.by_frame(), x.pose());
+      add_common_noise<7>(common, info);
+    }
+    return info;
+  };
+  estimate_ = tracks.empty() ? prior : update(prior, measured, update_config).posterior;
   if (!keep_finite(true)) return drop(Sensor::camera, "not finite");
-  check_mount(model, prior.x.R);
+  if (at == image.t) check_mount(model, prior.x.R);
   if (says_nothing(model.report())) {
     estimate_ = unlit;
     settle(*estimate_);
     return drop(Sensor::camera, "agrees with nothing");
   }
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::camera)].used;
-  trajectory_.correct(image.t, estimate_->x.pose(), estimate_->x.v - prior.x.v);
+  trajectory_.correct(at, estimate_->x.pose(), estimate_->x.v - prior.x.v);
   const SE3 T_WI = estimate_->x.pose();
-  if (!weak_.isZero(0) && model.report().used >= enough) note_drift(model.by_frame(), T_WI);
-  learn_from(model, tracks, pyramid, depth, prior);
+  if (blind && !feet_hold && model.report().used >= enough) note_drift(model.by_frame(), T_WI);
+  learn_from(*T_CI, model, tracks, pyramid, depth, prior);
   settle(*estimate_);
+  last_image_p_ = estimate_->x.p;
   if (model.report().used > 0) last_image_ = image.t;
   Output& seen = images_.emplace_back();
-  seen.coloured = colours_of(image.image, estimate_->x.tau, *camera_, T_CI_ * estimate_->x.pose().inverse(), depth);
+  seen.coloured = colours_of(image.image, estimate_->x.tau, *camera_, *T_CI * estimate_->x.pose().inverse(), depth);
   seen.indicators = indicators_of(model.report().used);
   seen.stages.visual_us = watch.lap_us();
 }
+
+// Standing feet measure the way along what no sweep knows by a few parts in ten thousand, images by a part in thousand, and what they are
+// wrong by is the same in image after image until other patches are seen: beside feet, images only catch what feet get grossly wrong.
+PoseCovariance Estimator::doubt_of_way(std::span<const PhotometricModel::FrameShare> shares, const SE3& T_WI) const {
+  constexpr double wrong_share = 0.3;  // of the way from the frames
+  double way = 0, weights = 0;
+  for (const auto& [frame, weight] : shares) {
+    way += weight * (T_WI.p - position_of(visual_map_.frame(frame))).norm();
+    weights += weight;
+  }
+  if (!(weights > 0)) return PoseCovariance::Zero();
+  way /= weights;
+  constexpr double shortest_step = 0.01;  // m
+  const double images = std::max(1.0, way / std::max(shortest_step, (T_WI.p - last_image_p_).norm()));
+  PoseCovariance V = PoseCovariance::Zero();
+  V.diagonal().tail<3>().setConstant(wrong_share * wrong_share * way * way * images);
+  return weak_ * V * weak_.transpose();
+}
+
+Eigen::Vector3d Estimator::position_of(const VisualFrame& frame) const { return (frame.T_CW.inverse() * T_CI_).p; }
 
 // Along what no sweep knows the pose is wrong by what the frames are that it was held against.
 void Estimator::note_drift(std::span<const PhotometricModel::FrameShare> shares, const SE3& T_WI) {
   std::vector<MapError::View> views;
   for (const auto& [frame, weight] : shares) {
     const VisualFrame& from = visual_map_.frame(frame);
-    views.push_back({from.error, (T_WI.p - (from.T_CW.inverse() * T_CI_).p).norm(), weight});
+    views.push_back({from.error, (T_WI.p - position_of(from)).norm(), weight});
   }
   map_error_.seen(T_WI, views, weak_);
 }
@@ -150,11 +193,11 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI) {
                                  "camera.time_offset right? Images are not used any more");
 }
 
-void Estimator::learn_from(const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,
-                           const DepthView& depth, const Estimate& prior) {
+void Estimator::learn_from(const SE3& T_CI, const PhotometricModel& model, std::span<const Track> tracks,
+                           std::span<const GreyImage> pyramid, const DepthView& depth, const Estimate& prior) {
   const PoseCovariance known = PoseCovariance::Identity() - weak_;
   const SE3 T_WI = as_the_map_has_it(prior.x, estimate_->x, weak_);
-  const SE3 T_CW = T_CI_ * T_WI.inverse();
+  const SE3 T_CW = T_CI * T_WI.inverse();
   VisualFrame frame;
   frame.T_CW = T_CW;
   frame.tau = estimate_->x.tau;

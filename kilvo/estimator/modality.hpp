@@ -17,4 +17,10 @@ constexpr bool has_legs(Modality m) { return m == Modality::kilv || m == Modalit
 constexpr bool has_lidar(Modality m) { return m != Modality::ki && m != Modality::coast; }
 constexpr bool has_camera(Modality m) { return m == Modality::kilv || m == Modality::liv; }
 
+/// What is left of it when the legs are lost.
+constexpr Modality without_legs(Modality m) {
+  if (!has_legs(m)) return m;
+  return has_camera(m) ? Modality::liv : has_lidar(m) ? Modality::li : Modality::coast;
+}
+
 }  // namespace kilvo

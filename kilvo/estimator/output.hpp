@@ -62,6 +62,7 @@ struct Statistics {
   std::uint64_t rollbacks = 0;                    // a non-finite state was thrown away
   std::array<StreamHealth, sensor_count> health;  // by Sensor
   std::uint64_t imu_outages = 0;                  // the IMU was silent for so long that the pose was unknown
+  std::uint64_t clock_steps = 0;                  // the IMU's time went back for good
   std::uint64_t searches = 0, found = 0;          // sweeps whose pose was searched for, and found
   std::uint64_t maps_begun_anew = 0;              // because sweeps had fitted nowhere for long
   bool diverged = false;

@@ -13,6 +13,9 @@ namespace kilvo {
 /// After an IMU gap longer than this nothing is known of the motion in between but that it was a walking robot's, s.
 inline constexpr double blind_gap = 0.1;
 
+/// No foot of a robot that runs is off the ground for longer.
+inline constexpr Duration longest_flight = std::chrono::milliseconds(500);
+
 /// A velocity known to this gives a sweep its shape, and tells a standing foot from a moving one, m/s.
 inline constexpr double known_velocity = 0.15;
 

@@ -1,6 +1,7 @@
 #include "kilvo/estimator/replay.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "kilvo/estimator/health.hpp"
 #include "kilvo/estimator/recovery.hpp"
@@ -9,16 +10,45 @@
 namespace kilvo {
 
 void Replay::add(const ImuSample& s) {
-  constexpr double memory = 2.0;  // s
-  const double share = imu_.empty() ? 1.0 : std::min(1.0, to_seconds(s.t - imu_.back().t) / memory);
-  const Eigen::Vector3d gyro = s.gyro - gyro_mean_, accel = s.accel - accel_mean_;
-  gyro_mean_ += share * gyro;
-  accel_mean_ += share * accel;
-  if (!imu_.empty()) {
-    gyro_variance_ += share * (gyro.cwiseAbs2() - gyro_variance_);
-    accel_variance_ += share * (accel.cwiseAbs2() - accel_variance_);
-  }
+  note_usual(s);
   imu_.push_back(s);
+}
+
+void Replay::note_usual(const ImuSample& s) {
+  if (imu_.empty()) {
+    usual_.gyro_mean = s.gyro;
+    usual_.accel_mean = s.accel;
+    return;
+  }
+  constexpr double memory = 2.0;  // s
+  const ImuSample& b = imu_.back();
+  const double dt = to_seconds(s.t - b.t), share = std::min(1.0, dt / memory);
+  const Eigen::Vector3d gyro = s.gyro - usual_.gyro_mean, accel = s.accel - usual_.accel_mean;
+  usual_.gyro_mean += share * gyro;
+  usual_.accel_mean += share * accel;
+  usual_.gyro_variance += share * (gyro.cwiseAbs2() - usual_.gyro_variance);
+  usual_.accel_variance += share * (accel.cwiseAbs2() - usual_.accel_variance);
+  // Neither what is missed nor a pair that came together counts for more than half of a period.
+  if (usual_.period == 0) usual_.period = dt;
+  usual_.period += (std::clamp(dt, 0.5 * usual_.period, 1.5 * usual_.period) - usual_.period) / 64;
+  if (imu_.size() < 2) return;
+  const ImuSample& a = imu_[imu_.size() - 2];
+  if (to_seconds(s.t - a.t) > 2.5 * usual_.period) return;
+  const double part = to_seconds(b.t - a.t) / to_seconds(s.t - a.t);
+  const double gyro2 = (b.gyro - a.gyro - part * (s.gyro - a.gyro)).squaredNorm() / 3;
+  const double accel2 = (b.accel - a.accel - part * (s.accel - a.accel)).squaredNorm() / 3;
+  usual_.gyro_bend2 = std::max(gyro2, (1 - share) * usual_.gyro_bend2);
+  usual_.accel_bend2 = std::max(accel2, (1 - share) * usual_.accel_bend2);
+}
+
+// Samples are missing: they lay beside the line between those that came.
+void Replay::say_missed(ImuInterval& interval, double gap) const {
+  const double missed = usual_.period > 0 ? std::round(gap / usual_.period) - 1 : 0;
+  if (missed < 1) return;
+  // The farther the neighbours, the farther beside; and all of them on the same side.
+  const double area = missed * usual_.period * 0.5 * (missed + 1), growth = area * area / gap;
+  interval.gyro_scale += growth * usual_.gyro_bend2 / (config_.noise.gyro * config_.noise.gyro);
+  interval.accel_scale += growth * usual_.accel_bend2 / (config_.noise.accel * config_.noise.accel);
 }
 
 // Beyond the end of its range an IMU may have seen anything of the same size.
@@ -54,11 +84,13 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   if (gap <= config_.max_imu_gap) {
     if (is_clipped(a, b)) say_clipped(interval);
     say_jump(interval, a, b);
+    say_missed(interval, gap);
     return interval;
   }
   // What was missed is about what varied before, constant over the gap: as a density, times the gap.
   constexpr double least_gyro = 0.02, least_accel = 0.2;  // rad/s, m/s^2
-  const double gyro2 = gyro_variance_.sum() + least_gyro * least_gyro, accel2 = accel_variance_.sum() + least_accel * least_accel;
+  const double gyro2 = usual_.gyro_variance.sum() + least_gyro * least_gyro,
+               accel2 = usual_.accel_variance.sum() + least_accel * least_accel;
   interval.gyro_scale = gyro2 * gap / (config_.noise.gyro * config_.noise.gyro);
   interval.accel_scale = accel2 * gap / (config_.noise.accel * config_.noise.accel);
   if (gap > blind_gap) interval.accel_scale = 1;  // more is added after the prediction (widen)
@@ -168,10 +200,7 @@ void Replay::copy_since(Time t, const Replay& other) {
     if (i + 1 >= other.steps_.size() || other.steps_[i + 1].t > t) steps_.push_back(other.steps_[i]);
   }
   told_ = other.told_;
-  gyro_mean_ = other.gyro_mean_;
-  accel_mean_ = other.accel_mean_;
-  gyro_variance_ = other.gyro_variance_;
-  accel_variance_ = other.accel_variance_;
+  usual_ = other.usual_;
 }
 
 void Replay::remember(const Estimate& e) {

@@ -60,6 +60,7 @@ class Replay {
   static constexpr std::size_t most_remembered = 100;
   void say_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
   void say_clipped(ImuInterval& interval) const;
+  void say_missed(ImuInterval& interval, double gap) const;
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
   std::optional<Eigen::Vector3d> gyro_at(Time t) const;  // none within a gap
   FootOrientations standing_at(Time t) const;
@@ -75,8 +76,15 @@ class Replay {
   Recent<LegStep> steps_;
   std::vector<Estimate> remembered_;
   // Of the last seconds of the IMU.
-  Eigen::Vector3d gyro_mean_ = Eigen::Vector3d::Zero(), accel_mean_ = Eigen::Vector3d::Zero();
-  Eigen::Vector3d gyro_variance_ = Eigen::Vector3d::Zero(), accel_variance_ = Eigen::Vector3d::Zero();
+  struct Usual {
+    double period = 0;  // s, of samples that follow each other
+    Eigen::Vector3d gyro_mean = Eigen::Vector3d::Zero(), accel_mean = Eigen::Vector3d::Zero();
+    Eigen::Vector3d gyro_variance = Eigen::Vector3d::Zero(), accel_variance = Eigen::Vector3d::Zero();
+    double gyro_bend2 = 0, accel_bend2 = 0;  // how far a sample lay beside the line between its neighbours at the most, squared
+  };
+  void note_usual(const ImuSample& s);
+
+  Usual usual_;
 };
 
 }  // namespace kilvo

@@ -194,5 +194,49 @@ TEST(Replay, AcrossAGapOfTheImuTheCovarianceSaysThatNobodyLooked) {
   EXPECT_GT(after_gap(milliseconds(500)), after_gap(milliseconds(120)));
 }
 
+TEST(Replay, StampsThatJitterAreNoMissedSamples) {
+  const auto after = [](Duration jitter, Duration beside) {
+    Replay replay{EstimatorConfig{}};
+    for (int i = 0; i <= 40; ++i) {
+      ImuSample s = imu_at(i * milliseconds(5));
+      s.accel.x() += i % 2 == 0 ? 5 : -5;
+      s.t += i % 3 == 0 ? jitter : -jitter;
+      replay.add(s);
+      s.t += beside;
+      if (beside > Duration(0) && i == 10) replay.add(s);
+    }
+    Estimate e = start();
+    e.P *= 1e-6;
+    Trajectory record(std::chrono::seconds(2));
+    replay.advance(e, begin_time + milliseconds(195), &record);
+    return std::sqrt(e.P.block<3, 3>(at::v, at::v).trace());
+  };
+  const double steady = after({}, {});
+  EXPECT_NEAR(after(microseconds(500), {}), steady, 0.05 * steady);
+  EXPECT_NEAR(after({}, microseconds(10)), steady, 0.05 * steady);
+}
+
+TEST(Replay, AMissedSampleMakesTheVelocityAsUncertainAsTheSignalIsRough) {
+  const auto after = [](double roughness, bool missed) {
+    Replay replay{EstimatorConfig{}};
+    for (int i = 0; i <= 40; ++i) {
+      ImuSample s = imu_at(i * milliseconds(5));
+      s.accel.x() += i % 2 == 0 ? roughness : -roughness;
+      if (!missed || i != 39) replay.add(s);
+    }
+    Estimate e = start();
+    e.P *= 1e-6;
+    Trajectory record(std::chrono::seconds(2));
+    replay.advance(e, begin_time + milliseconds(190), &record);
+    const double before = e.P.block<3, 3>(at::v, at::v).trace();
+    replay.advance(e, begin_time + milliseconds(200), &record);
+    return std::sqrt(e.P.block<3, 3>(at::v, at::v).trace() - before);
+  };
+  EXPECT_LT(after(5, false), 0.001);
+  // Twice the amplitude beside the line, at one of three axes, for one sample.
+  EXPECT_NEAR(after(5, true), 2 * 5 * 0.005, 0.002);
+  EXPECT_LT(after(0.1, true), 0.004);
+}
+
 }  // namespace
 }  // namespace kilvo

@@ -26,6 +26,13 @@ PoseCovariance noise_of_velocity(const Covariance& P) {
   return out;
 }
 
+// Of sound sweeps nine tenths of what meets a surface lies on it, in a crowd as well.
+bool contradicts_map(const RegistrationReport& report) {
+  constexpr double known_share = 0.2, agreeing_share = 0.4;
+  const int met = report.matched + report.rejected;
+  return met > known_share * report.clusters && report.matched < agreeing_share * met;
+}
+
 std::string milliseconds_of(double seconds) { return std::to_string(std::lround(1e3 * seconds)) + " ms"; }
 
 }  // namespace
@@ -36,8 +43,7 @@ void Estimator::choose_modality(Time t) {
   // Vision needs the surfaces that the LiDAR sees.
   const bool camera = lidar && last_image_ && t - *last_image_ <= silence(robot_.camera.rate, 3, std::chrono::milliseconds(300));
   const Modality with_legs = lidar ? (camera ? Modality::kilv : Modality::kil) : Modality::ki;
-  const Modality without_legs = lidar ? (camera ? Modality::liv : Modality::li) : Modality::coast;
-  const Modality now = legs ? with_legs : without_legs;
+  const Modality now = legs ? with_legs : without_legs(with_legs);
   const bool after_outage = std::string_view(cause_).starts_with("imu ") && cause_ != std::string_view("imu is back");
   if (after_outage) cause_ = "imu is back";
   if (now == modality_) return;
@@ -167,7 +173,9 @@ bool Estimator::register_sweep(const Estimate& prior, LidarModel& model, const s
     PoseCovariance shared = within_scan.with_prediction;
     shared.diagonal() = shared.diagonal().cwiseMax(-0.25 * prior.P.diagonal().head<6>());
     estimate_ = update(prior, measured, patient, &shared).posterior;
-    return true;
+    if (!contradicts_map(model.report())) return true;
+    estimate_ = prior;
+    return false;
   }
   ++statistics_.searches;
   const auto found = find_pose(map_, clusters, robot_.lidar.T_imu_lidar.p, prior, config_.lidar, workers_);
@@ -222,6 +230,14 @@ void Estimator::note_outage(Time sweep_begin) {
   constexpr int periods = 4;
   if (last_middle_ != Time{} && sweep_begin - last_sweep_ > from_seconds(periods / robot_.lidar.rate))
     recovery_.sweeps_to_go = std::max(recovery_.sweeps_to_go, consistent_sweeps);
+}
+
+void Estimator::note_clock_step() {
+  statistics_.clock_steps = clock_steps_.count();
+  constexpr std::uint64_t most = 10;
+  if (clock_steps_.count() > most) return;
+  statistics_.warnings.push_back("the IMU's clock went back by " + milliseconds_of(to_seconds(clock_steps_.last())) +
+                                 ": the outputs' stamps go on as if it had not");
 }
 
 // What the streams themselves showed; what could not be used is said elsewhere.

@@ -61,13 +61,11 @@ std::optional<std::string> Timeline::admit(Measurement m, Time key) {
   }
   newest_of_all_ = std::max(newest_of_all_.value_or(key), key);
   const auto place = std::tuple(key, sensor, sequence_++);
-  const auto* scan = std::get_if<LidarScan>(&m);
-  const Time middle = scan == nullptr ? stamp : key - (key - begin_of(*scan)) / 2;
   if (spare_.empty()) {
-    waiting_.emplace(place, Waiting{std::move(m), middle});
+    waiting_.emplace(place, std::move(m));
   } else {
     spare_.back().key() = place;
-    spare_.back().mapped() = {std::move(m), middle};
+    spare_.back().mapped() = std::move(m);
     waiting_.insert(std::move(spare_.back()));
     spare_.pop_back();
   }
@@ -82,25 +80,25 @@ void Timeline::note_spacing(std::size_t s, Time key) {
 }
 
 // Something may come of this sensor that must go before.
-bool Timeline::is_awaited(std::size_t s, Time key, const Waiting& first) const {
-  const bool is_scan = std::holds_alternative<LidarScan>(first.m);
+bool Timeline::is_awaited(std::size_t s, Time key) const {
   switch (static_cast<Sensor>(s)) {
     case Sensor::imu:
     case Sensor::legs:
       return !newest_[s] || *newest_[s] < key;
     case Sensor::camera:
-      if (wait_for_images_) break;
-      if (!is_scan) return false;
-      key = first.middle;
+      if (!wait_for_images_) return false;
       break;
     case Sensor::lidar:
       break;
   }
+  // Who has been silent for long is not waited for.
+  const auto& imu = newest_[static_cast<std::size_t>(Sensor::imu)];
+  if (imu && newest_[s] && *imu - *newest_[s] > std::max(max_wait_, 3 * spacing_[s])) return false;
   // A message that comes so much sooner than the one before is fused late, no more.
   return !newest_[s] || *newest_[s] + 7 * spacing_[s] / 10 < key;
 }
 
-bool Timeline::may_go(Time key, const Waiting& first) const {
+bool Timeline::may_go(Time key) const {
   // The IMU, which everything needs, is the clock: one sensor that is ahead of it must not make all others late. If it is silent, so much
   // may gather and no more.
   constexpr std::size_t most = 5000;
@@ -109,17 +107,17 @@ bool Timeline::may_go(Time key, const Waiting& first) const {
       expected_[static_cast<std::size_t>(Sensor::imu)] ? imu && *imu - key >= max_wait_ : *newest_of_all_ - key >= max_wait_;
   if (ended_ || waited || waiting_.size() > most) return true;
   for (std::size_t s = 0; s < sensor_count; ++s) {
-    if (expected_[s] && is_awaited(s, key, first)) return false;
+    if (expected_[s] && is_awaited(s, key)) return false;
   }
   return true;
 }
 
 std::optional<Measurement> Timeline::pop() {
-  if (waiting_.empty() || !may_go(std::get<Time>(waiting_.begin()->first), waiting_.begin()->second)) return std::nullopt;
+  if (waiting_.empty() || !may_go(std::get<Time>(waiting_.begin()->first))) return std::nullopt;
   auto first = waiting_.extract(waiting_.begin());
   const Time key = std::get<Time>(first.key());
   released_ = std::max(released_.value_or(key), key);
-  std::optional<Measurement> out = std::move(first.mapped().m);
+  std::optional<Measurement> out = std::move(first.mapped());
   constexpr std::size_t most_spare = 64;
   if (spare_.size() < most_spare) spare_.push_back(std::move(first));
   return out;

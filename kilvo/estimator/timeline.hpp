@@ -1,8 +1,7 @@
 // Puts measurements into the order of their stamps. A measurement is released when nothing of an earlier stamp can be expected any more
 // that must go before it, or when it has waited max_wait of the IMU's time.
 //
-// Scans are waited for from when the next one may be complete. So are images; but since a late one is fused at its own time all the same,
-// one need not: then nothing waits for an image but a scan, and that only for images of before its middle.
+// Scans are waited for from when the next one may be complete. So are images; but since a late one is fused all the same, one need not.
 #pragma once
 
 #include <array>
@@ -44,12 +43,8 @@ class Timeline {
   void end();
 
  private:
-  struct Waiting {
-    Measurement m;
-    Time middle;  // of a scan; of all others the stamp
-  };
-  bool may_go(Time key, const Waiting& first) const;
-  bool is_awaited(std::size_t s, Time key, const Waiting& first) const;
+  bool may_go(Time key) const;
+  bool is_awaited(std::size_t s, Time key) const;
   void note_spacing(std::size_t s, Time key);
   void give_up_suspects();
   std::optional<std::string> admit(Measurement m, Time key);
@@ -60,7 +55,7 @@ class Timeline {
   std::array<Duration, sensor_count> spacing_{};         // of the keys, lately, at the least
   std::optional<Time> released_, newest_of_all_;
   // By completion; of the same time the IMU first; then by arrival.
-  using Queue = std::map<std::tuple<Time, Sensor, std::uint64_t>, Waiting>;
+  using Queue = std::map<std::tuple<Time, Sensor, std::uint64_t>, Measurement>;
   Queue waiting_;
   std::vector<Queue::node_type> spare_;  // nodes of what has gone, to be used again: nothing is allocated at the rate of the legs
   std::vector<Measurement> suspects_;    // ahead of all others

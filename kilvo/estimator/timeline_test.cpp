@@ -54,23 +54,18 @@ TEST(Timeline, NothingWaitsForAScanThatCannotBeCompleteYet) {
   EXPECT_EQ(all_from(timeline), (std::vector<double>{0.9, 0.95, 1.0, 1.0, 1.06})) << "the next scan may be complete from 1.07 on";
 }
 
-TEST(Timeline, OnlyAScanWaitsForImagesAndOnlyForThoseBeforeItsMiddle) {
-  CameraImage image;
-  const auto image_at = [&image](double s) {
-    image.t = time_from_ns(0) + from_seconds(s);
-    return image;
-  };
-  Timeline timeline({true, false, true, true}, from_seconds(10), false);
-  EXPECT_FALSE(timeline.push(scan_from(0.9, 0.1)));
-  for (const double s : {0.84, 0.94}) EXPECT_FALSE(timeline.push(image_at(s)));
-  EXPECT_FALSE(timeline.push(imu_at(0.9)));
-  EXPECT_FALSE(timeline.push(imu_at(1.01)));
-  EXPECT_EQ(all_from(timeline), (std::vector<double>{0.84, 0.9, 0.94, 1.0})) << "no image of before 0.95 can be missing";
-  EXPECT_FALSE(timeline.push(scan_from(1.0, 0.1)));
-  EXPECT_FALSE(timeline.push(imu_at(1.11)));
-  EXPECT_EQ(all_from(timeline), (std::vector<double>{1.01})) << "the image of 1.04 belongs before the middle of the scan";
-  EXPECT_FALSE(timeline.push(image_at(1.04)));
-  EXPECT_EQ(all_from(timeline), (std::vector<double>{1.04, 1.1, 1.11}));
+TEST(Timeline, NothingWaitsForImagesThatNeedNotBeWaitedFor) {
+  for (const bool wait : {true, false}) {
+    Timeline timeline({true, false, true, true}, from_seconds(10), wait);
+    CameraImage image;
+    for (const double s : {0.84, 0.94}) {
+      image.t = time_from_ns(0) + from_seconds(s);
+      EXPECT_FALSE(timeline.push(image));
+    }
+    EXPECT_FALSE(timeline.push(scan_from(1.0, 0.1)));
+    EXPECT_FALSE(timeline.push(imu_at(1.11)));
+    EXPECT_EQ(all_from(timeline), wait ? (std::vector<double>{0.84, 0.94}) : (std::vector<double>{0.84, 0.94, 1.1}));
+  }
 }
 
 TEST(Timeline, ALateScanOrImageGoesNext) {
@@ -92,6 +87,19 @@ TEST(Timeline, WaitsForASilentSensorNoLongerThanMaxWait) {
   const auto released = all_from(timeline);
   ASSERT_EQ(released.size(), 11u);
   EXPECT_DOUBLE_EQ(released.back(), 1.1);
+}
+
+TEST(Timeline, DoesNotWaitForASensorThatHasBeenSilentForLong) {
+  Timeline timeline(imu_and_lidar, from_seconds(0.2));
+  for (int i = 0; i <= 5; ++i) EXPECT_FALSE(timeline.push(scan_from(1.0 + 0.1 * i, 0)));
+  for (int i = 0; i <= 60; ++i) {
+    EXPECT_FALSE(timeline.push(imu_at(1.3 + 0.01 * i)));
+    all_from(timeline);
+  }
+  // Silent for more than three periods: the newest sample goes at once.
+  EXPECT_FALSE(timeline.push(imu_at(1.91)));
+  ASSERT_TRUE(timeline.pop());
+  EXPECT_FALSE(timeline.pop());
 }
 
 TEST(Timeline, SortsSwappedNeighbours) {

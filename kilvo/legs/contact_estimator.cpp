@@ -223,6 +223,7 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
       f.slow.reset();
     }
     if (contacts_.on[side]) stand(f, m, x, !stood, map);
+    contacts_.ground[side] = f.ground;
     contacts_.clearance[side] = f.ground.height_of(m.lowest);
     contacts_.d_fv[side] = detection_threshold * m.slowest / (config_.lift_off_speed * swing_speed_);
   }

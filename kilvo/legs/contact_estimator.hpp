@@ -20,6 +20,7 @@ struct Contacts {
   std::array<double, 2> clearance = {0, 0};  // of the lowest point over the ground on which it stood last, m
   double d_a = 0;                            // normalised deviation of the acceleration
   std::array<double, 2> d_fv = {0, 0};       // normalised deviation of the foot's velocity; above 10: it moves
+  std::array<GroundPatch, 2> ground;         // on which each stands or stood last
 };
 
 /// Velocity in the world of a point that is at p_I and moves by v_I relative to the IMU, m/s. `omega`: bias-free rate, rad/s.

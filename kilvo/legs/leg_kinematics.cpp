@@ -23,14 +23,17 @@ Eigen::Vector3d to_eigen(const KDL::Vector& v) { return {v.x(), v.y(), v.z()}; }
 Eigen::Matrix3d to_eigen(const KDL::Rotation& R) { return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(R.data); }
 
 KDL::Joint to_kdl(const urdf::Joint& joint, bool locked) {
+  const auto fault = [&joint](const char* what) { return std::invalid_argument("robot.urdf: joint " + joint.name + what); };
   const KDL::Frame origin = to_kdl(joint.parent_to_joint_origin_transform);
   const KDL::Vector axis = origin.M * to_kdl(joint.axis);
-  if (!locked && (joint.type == urdf::Joint::REVOLUTE || joint.type == urdf::Joint::CONTINUOUS))
-    return {joint.name, origin.p, axis, KDL::Joint::RotAxis};
-  if (!locked && joint.type == urdf::Joint::PRISMATIC) return {joint.name, origin.p, axis, KDL::Joint::TransAxis};
-  if (!locked && joint.type != urdf::Joint::FIXED)
-    throw std::invalid_argument("robot.urdf: joint " + joint.name + " is neither revolute, prismatic nor fixed");
-  return KDL::Joint(joint.name, KDL::Joint::Fixed);
+  constexpr double absurd_length = 100;  // m
+  if (!(origin.p.Norm() < absurd_length)) throw fault(": origin is over 100 m away");
+  if (locked || joint.type == urdf::Joint::FIXED) return KDL::Joint(joint.name, KDL::Joint::Fixed);
+  if (!(axis.Norm() > 1e-6)) throw fault(": axis has no length");
+  if (joint.type == urdf::Joint::PRISMATIC) return {joint.name, origin.p, axis, KDL::Joint::TransAxis};
+  if (joint.type != urdf::Joint::REVOLUTE && joint.type != urdf::Joint::CONTINUOUS)
+    throw fault(" is neither revolute, prismatic nor fixed");
+  return {joint.name, origin.p, axis, KDL::Joint::RotAxis};
 }
 
 void add_children(const urdf::Link& link, const Robot& robot, KDL::Tree& tree) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 namespace kilvo::lab {
@@ -65,6 +66,13 @@ void wipe(Measurement& measurement) {
   std::ranges::fill(pixels, static_cast<std::uint8_t>(sum / pixels.size()));
 }
 
+void shake(Measurement& measurement, double s, double amplitude) {
+  auto* imu = std::get_if<ImuSample>(&measurement);
+  if (imu == nullptr) return;
+  constexpr double frequency = 173;  // Hz
+  imu->accel += amplitude * std::sin(2 * std::numbers::pi * frequency * s) * Eigen::Vector3d(0.6, 0.5, 0.62);
+}
+
 // The content of `before` at the time of `measurement`.
 void freeze(Measurement& measurement, const std::optional<Measurement>& before) {
   if (!before) return;
@@ -100,7 +108,10 @@ void FailingSource::spoil(const Failure& failure, Measurement& measurement) {
       return narrow(measurement, failure.amount);
     case FailureKind::textureless:
       return wipe(measurement);
+    case FailureKind::vibration:
+      return shake(measurement, to_seconds(stamp_of(measurement) - begin_), failure.amount);
     case FailureKind::drop:
+    case FailureKind::random_loss:
     case FailureKind::delay:
     case FailureKind::duplicate:
       return;  // not of the content
@@ -113,7 +124,7 @@ void FailingSource::take(Measurement measurement, Time arrived) {
   bool twice = false, frozen = false;
   for (const Failure& failure : failures_) {
     if (!is_on(failure, sensor, arrived)) continue;
-    if (failure.kind == FailureKind::drop) {
+    if (failure.kind == FailureKind::drop || (failure.kind == FailureKind::random_loss && random_.uniform() < failure.amount)) {
       ++dropped_[static_cast<std::size_t>(sensor)];
       return;
     }

@@ -25,6 +25,8 @@ enum class FailureKind : std::uint8_t {
   darkness,       // images: grey levels times `amount`
   narrow_sector,  // scans: only points within `amount` / 2 rad of the LiDAR's x axis, all around it in elevation
   textureless,    // images: every pixel is the image's mean
+  random_loss,    // each message is lost with the probability `amount`
+  vibration,      // the accelerometer shakes at 173 Hz, `amount` m/s^2 at the most
 };
 
 /// Befalls the messages of a sensor that arrive in [from, until) seconds after the beginning. What a kind does not apply to stays as it is.
@@ -48,7 +50,7 @@ class FailingSource final : public MeasurementSource {
   /// When the measurement that next() gave last arrived.
   Time arrived() const { return arrived_; }
 
-  /// Messages lost by `drop`.
+  /// Messages lost.
   std::uint64_t dropped(Sensor sensor) const { return dropped_[static_cast<std::size_t>(sensor)]; }
 
  private:

@@ -134,6 +134,26 @@ TEST(Failures, StampsJumpAndMessagesComeTwice) {
   EXPECT_EQ(with<JointSample>({FailureKind::duplicate, Sensor::legs, 0, 0.5}).size(), 150U);
 }
 
+TEST(Failures, MessagesAreLostAtRandomAndCounted) {
+  TinySource source;
+  FailingSource failing(source, {{FailureKind::random_loss, Sensor::imu, 0, 1, 0.3}}, begin);
+  std::size_t imu = 0, others = 0;
+  while (const auto m = failing.next()) ++(sensor_of(*m) == Sensor::imu ? imu : others);
+  EXPECT_EQ(others, 120U);
+  EXPECT_NEAR(static_cast<double>(imu), 70, 15);
+  EXPECT_EQ(failing.dropped(Sensor::imu), 100 - imu);
+}
+
+TEST(Failures, AVibrationIsInTheAccelerometerAlone) {
+  const auto samples = with<ImuSample>({FailureKind::vibration, Sensor::imu, 0, 1, 5});
+  double most = 0;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(samples[i].gyro.x(), static_cast<double>(i) + 1);
+    most = std::max(most, (samples[i].accel - Eigen::Vector3d(0, 0, 9.8)).norm());
+  }
+  EXPECT_NEAR(most, 5, 0.1);
+}
+
 TEST(Failures, ImagesGoDarkOrLoseTheirTexture) {
   EXPECT_EQ(with<CameraImage>({FailureKind::darkness, Sensor::camera, 0, 9, 0.1})[3].image.pixels, (std::vector<std::uint8_t>{10, 20}));
   EXPECT_EQ(with<CameraImage>({FailureKind::textureless, Sensor::camera})[3].image.pixels, (std::vector<std::uint8_t>{150, 150}));

@@ -134,8 +134,26 @@ TEST_F(Verbs, ConfigCheckFindsMistakes) {
   expect_error({"config", "check", folder / "missing.yaml"}, 2, "missing.yaml");
 }
 
+TEST_F(Verbs, ConfigCheckLooksIntoTheUrdf) {
+  const std::string robots = KILVO_SOURCE_DIR "/config/robots/", good = read_text(robots + "g1_12dof.urdf");
+  const std::string urdf = folder / "robot.urdf";
+  const auto expect = [&](const std::string& text, const std::string& error) {
+    write_text(urdf, text);
+    expect_error({"config", "check", robots + "g1.yaml", "--set", "robot.urdf=" + urdf}, 2, error);
+  };
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  };
+  expect("<robot>", urdf + " has no links: not a URDF file");
+  expect(with("<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 0\"/>"), "axis has no length");
+  expect(with("<origin xyz=\"0 0.064452 -0.1027\"", "<origin xyz=\"0 1e30 0\""), "origin is over 100 m away");
+}
+
 TEST_F(Verbs, EveryShippedRobotIsGood) {
-  for (const char* robot : {"g1", "g1_cam_r", "g1_tilt", "g1_tilt_cam_r"}) {
+  for (const char* robot : {"g1", "g1_29dof", "g1_cam_r", "g1_tilt", "g1_tilt_cam_r", "icub", "sim"}) {
     EXPECT_EQ(kilvo({"config", "check", KILVO_SOURCE_DIR "/config/robots/" + std::string(robot) + ".yaml"}).code, 0) << robot;
   }
 }

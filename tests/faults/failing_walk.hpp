@@ -52,6 +52,11 @@ struct Outcome {
     }
     return out;
   }
+  double rms_error() const {
+    double sum = 0;
+    for (const Moment& m : moments) sum += m.error * m.error;
+    return std::sqrt(sum / static_cast<double>(moments.size()));
+  }
   std::vector<std::string> changes() const {
     std::vector<std::string> out;
     for (std::size_t i = 0; i < moments.size(); ++i) {

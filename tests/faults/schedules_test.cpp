@@ -39,7 +39,8 @@ std::string words(const std::vector<Failure>& failures) {
   std::string out;
   for (const Failure& f : failures) {
     char text[100];
-    std::snprintf(text, sizeof text, " %s %s %.2f-%.2f (%.2f)", f.kind == FailureKind::darkness ? "darkness" : kinds[static_cast<int>(f.kind)], name_of(f.sensor), f.from, f.until,
+    std::snprintf(text, sizeof text, " %s %s %.2f-%.2f (%.2f)",
+                  f.kind == FailureKind::darkness ? "darkness" : kinds[static_cast<int>(f.kind)], name_of(f.sensor), f.from, f.until,
                   f.amount);
     out += text;
   }

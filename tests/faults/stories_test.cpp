@@ -120,6 +120,48 @@ TEST_F(Faults, OneWrongSampleOfTheImuIsOutlived) {
   }
 }
 
+TEST_F(Faults, ClocksThatGoBackTogetherAreFollowed) {
+  for (const double step : {-1.0, -3600.0}) {
+    const auto all = [step](Sensor s) { return Failure{FailureKind::time_jump, s, 6, for_ever, step}; };
+    const Outcome o = with({all(Sensor::imu), all(Sensor::legs), all(Sensor::lidar)});
+    say("clocks back", o, 6, 14);
+    EXPECT_THAT(o.changes(), testing::ElementsAre("KIL"));
+    EXPECT_EQ(o.statistics.clock_steps, 1u);
+    EXPECT_THAT(o.statistics.warnings, testing::Contains(testing::HasSubstr("clock went back")));
+    // The outputs go on in the time that they began with, which is the truth's.
+    EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.03);
+  }
+}
+
+TEST_F(Faults, WhatIsLostNowAndThenCostsLittle) {
+  const double reference = with({}).rms_error();
+  for (const double share : {0.1, 0.3}) {
+    const auto some = [share](Sensor s) { return Failure{FailureKind::random_loss, s, 0, for_ever, share}; };
+    const Outcome o = with({some(Sensor::imu), some(Sensor::legs), some(Sensor::lidar)});
+    say("random loss", o, 0, 14);
+    std::printf("rms %.2f mm, %.2f mm with nothing lost\n", 1e3 * o.rms_error(), 1e3 * reference);
+    EXPECT_LT(o.rms_error(), 2 * reference);
+    EXPECT_LT(o.worst(&Moment::sigmas, 5, 14), 4.0);
+  }
+}
+
+TEST_F(Faults, AVibrationFasterThanTheImuIsBorne) {
+  const Outcome o = with({{FailureKind::vibration, Sensor::imu, 4, for_ever, 5}});
+  say("vibration", o, 4, 14);
+  EXPECT_THAT(o.changes(), testing::ElementsAre("KIL"));
+  EXPECT_LT(o.rms_error(), 3 * with({}).rms_error());
+}
+
+TEST_F(Faults, SweepsThatContradictTheMapAreRefused) {
+  const Outcome o = with({{FailureKind::noise, Sensor::lidar, 6, 7, 1.0}});
+  say("scattered points", o, 6, 14);
+  const auto& dropped = o.statistics.sensors[static_cast<std::size_t>(Sensor::lidar)].dropped;
+  ASSERT_TRUE(dropped.contains("fits nowhere in the map"));
+  EXPECT_GE(dropped.at("fits nowhere in the map"), 5u);
+  EXPECT_EQ(o.statistics.maps_begun_anew, 0u);
+  EXPECT_LT(o.worst(&Moment::error, 6, 14), 0.05);
+}
+
 TEST_F(Faults, AClockAheadOfTheImuIsMeasuredAndItsSensorNotUsed) {
   for (const Sensor sensor : {Sensor::lidar, Sensor::legs}) {
     const Outcome o = with({{FailureKind::time_jump, sensor, 0, for_ever, 0.3}});

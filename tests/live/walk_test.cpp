@@ -85,15 +85,48 @@ TEST(LiveWalk, IsTheOfflineOneOnceTheCorrectionsAreIn) {
 }
 
 TEST(LiveWalk, LateSensorsCostNoMessageAndLittleAccuracy) {
-  for (const auto& [sensor, seconds] : {std::pair(Sensor::camera, 0.1), std::pair(Sensor::lidar, 0.05), std::pair(Sensor::legs, 0.02)}) {
+  for (const auto& [sensor, seconds] :
+       {std::pair(Sensor::camera, 0.1), std::pair(Sensor::lidar, 0.05), std::pair(Sensor::legs, 0.02), std::pair(Sensor::legs, 0.15)}) {
     const Lived lived = live_through(walk(), {{.kind = lab::FailureKind::delay, .sensor = sensor, .amount = seconds}});
     EXPECT_LT(walk().worst_error(lived.states), 0.02) << name_of(sensor);
-    EXPECT_GT(lived.states.size(), 2500u) << name_of(sensor);
+    // Late or not, each leg sample (500 Hz, from when it stands) is answered.
+    EXPECT_GT(lived.states.size(), 4400u) << name_of(sensor);
+    EXPECT_TRUE(lived.statistics.warnings.empty()) << name_of(sensor);
     const auto images = std::ranges::count_if(lived.sweeps, &Output::is_image),
                sweeps = std::ranges::count_if(lived.sweeps, &Output::is_sweep);
     EXPECT_GE(images, 90) << name_of(sensor);
     EXPECT_GE(sweeps, 90) << name_of(sensor);
   }
+}
+
+TEST(LiveWalk, ALostSensorIsSaidInTime) {
+  using lab::FailureKind;
+  const Lived lived = live_through(walk(), {{FailureKind::drop, Sensor::legs, 5, 6, 0}, {FailureKind::drop, Sensor::lidar, 7, 8, 0}});
+  const auto said = [&lived](const char* cause) {
+    const auto first = std::ranges::find(lived.states, std::string_view(cause), [](const Output& o) { return std::string_view(o.cause); });
+    return first == lived.states.end() ? 1e9 : to_seconds(first->t - walk().time(0));
+  };
+  // 50 ms, and 0.3 s after the last sweep.
+  EXPECT_NEAR(said("legs lost"), 5.05, 0.01);
+  EXPECT_NEAR(said("lidar lost"), 7.25, 0.06);
+  for (const Output& o : lived.states) {
+    const double s = to_seconds(o.t - walk().time(0));
+    if (s > 5.06 && s < 6) {
+      EXPECT_FALSE(has_legs(o.modality)) << s << ": said once, not taken back";
+    }
+  }
+}
+
+TEST(LiveWalk, ClocksThatGoBackAreFollowed) {
+  using lab::FailureKind;
+  std::vector<lab::Failure> all;
+  for (const Sensor s : {Sensor::imu, Sensor::legs, Sensor::lidar, Sensor::camera})
+    all.push_back({FailureKind::time_jump, s, 6, std::numeric_limits<double>::infinity(), -1});
+  const Lived lived = live_through(walk(), all);
+  EXPECT_GT(lived.states.back().t, walk().time(9.9));
+  EXPECT_LT(walk().worst_error(lived.states), 0.02);
+  EXPECT_EQ(lived.statistics.warnings.size(), 1u);
+  EXPECT_EQ(lived.statistics.clock_steps, 1u);
 }
 
 TEST(LiveWalk, OutputsAreFiniteAndOrderedWhateverIsLost) {

@@ -1,0 +1,42 @@
+// Clocks that step back: the computer's time was set, or a recording is played in a loop. What comes after the step is put after what came
+// before, as it was measured.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "kilvo/sensors/measurement.hpp"
+
+namespace kilvo {
+
+class ClockSteps {
+ public:
+  /// Takes the measurements in the order of their arrival and puts each onto the time axis of the first. Says why one is not to be used:
+  /// the IMU's time has gone back, and whether it stays so is not known yet. Such a one is left as it is.
+  const char* follow(Measurement& m);
+
+  /// How often the IMU's time went back for good, and by how much at the last time.
+  std::uint64_t count() const { return count_; }
+  Duration last() const { return last_; }
+
+ private:
+  const char* follow_imu(Time t);
+  bool is_sure() const;
+  void vote(std::size_t s, Time t);
+
+  std::array<Duration, sensor_count> offset_{};  // added to the stamps, by Sensor
+  // By which the stamps of each trail the IMU's as they arrive.
+  std::array<std::optional<Duration>, sensor_count> lag_;
+  // Whether each goes with the IMU is found out from its first messages after a step.
+  std::array<bool, sensor_count> open_{};
+  std::array<std::optional<Time>, sensor_count> open_until_;
+  std::optional<Time> imu_;              // the newest, with its offset
+  int elsewhere_ = 0;                    // IMU samples in a row of another time
+  Time first_there_{}, newest_there_{};  // of them
+  int for_ = 0, against_ = 0;            // messages of the others meanwhile that went with them, and that did not
+  std::uint64_t count_ = 0;
+  Duration last_{};
+};
+
+}  // namespace kilvo
