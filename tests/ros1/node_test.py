@@ -94,7 +94,11 @@ class Story:
             self.listens = wait_until(lambda: self.master.subscribed("/joint_states"))
             self.ears = Ears()
             self.walk()
-            self.other_types = {package: self.play_as(package) for package in ("livox_ros_driver", "livox_ros_driver2")}
+            self.other_types = {package: self.play_as(package, self.config) for package in ("livox_ros_driver", "livox_ros_driver2")}
+            feet_config = ros_world.with_two_feet(self.config, os.path.join(os.path.dirname(self.bag), "feet.yaml"))
+            body = ros_world.Body(os.path.join(os.path.dirname(self.bag), "robot.urdf"))
+            self.two_feet = self.play_as("livox_ros_driver2", feet_config, body)
+            self.start_anew(self.config)
             self.pause_and_reset()
             self.without_master()
         finally:
@@ -104,6 +108,12 @@ class Story:
 
     def start_node(self, *parameters: str) -> Process:
         return Process(ARGUMENTS.node, *(parameters or (f"_config:={self.config}", f"_map_file:={self.map_file}")))
+
+    def start_anew(self, config: str) -> None:
+        self.node.end()
+        self.node = self.start_node(f"_config:={config}", f"_map_file:={self.map_file}")
+        wait_until(lambda: self.master.subscribed("/joint_states"))
+        self.ears.diagnostics.clear()
 
     def play(self, start: float = 0, seconds: float | None = None) -> Process:
         return ros_world.player(self.bag, ARGUMENTS.speed, start, seconds)
@@ -129,9 +139,8 @@ class Story:
     def pause_and_reset(self) -> None:
         self.reset_answer = call("/kilvo/reset")
         self.poses_before_reset = len(self.ears.best)
-        self.second = self.play()
-        wait_until(lambda: "KILV" in self.ears.newest_status("estimator").message)
-        time.sleep(1.0)
+        second = self.play()
+        wait_until(lambda: len(self.ears.best) > self.poses_before_reset + 1000 and "KILV" in self.ears.newest_status("estimator").message)
         paused = time.monotonic()
         self.pause_answer = call("/kilvo/pause/lidar", data=True)
         wait_until(lambda: self.ears.first_status_since(paused, "lidar", "paused"), 10)
@@ -139,27 +148,29 @@ class Story:
         self.pause_said_after = self.ears.first_status_since(paused, "lidar", "paused")
         self.legs_carry_after = self.ears.first_status_since(paused, "estimator", "KI (")
         self.estimator_names = self.ears.newest_status("estimator").message
+        second.end(signal.SIGKILL)
 
     # A node begun anew, since each learns once how its LiDAR writes times.
-    def play_as(self, package: str) -> str:
-        self.node.end()
+    def play_as(self, package: str, config: str, body=None) -> dict:
         bag = os.path.join(self.folder, f"{package}.bag")
-        ros_world.to_other_types(self.bag, bag, 4.0, package)
-        self.node = self.start_node()
-        wait_until(lambda: self.master.subscribed("/joint_states"))
-        self.ears.diagnostics.clear()
+        ros_world.to_other_types(self.bag, bag, 4.0, package, body)
+        self.start_anew(config)
         player = Process("rosbag", "play", "-q", "-d", "1.0", bag)
         wait_until(lambda: self.ears.newest_status("estimator") and "KILV" in self.ears.newest_status("estimator").message, 15)
         player.wait()
-        return self.ears.newest_status("estimator").message
+        return {name: self.ears.newest_status(name) for name in ("estimator", "legs", "lidar", "camera")}
 
     def without_master(self) -> None:
+        call("/kilvo/reset")
+        count = len(self.ears.best)
+        second = self.play()
+        wait_until(lambda: len(self.ears.best) > count + 100)
         self.master.end(signal.SIGKILL)
         count = len(self.ears.best)
         self.goes_on = wait_until(lambda: len(self.ears.best) > count + 100, 10)
         time.sleep(1.0)
         self.alive_without_master = self.node.running()
-        self.second.end(signal.SIGKILL)
+        second.end(signal.SIGKILL)
         self.master = ros_world.Master(self.port)
         self.found_again = wait_until(lambda: self.master.subscribed("/joint_states") and "/kilvo/odometry" in self.master.published())
         call("/kilvo/reset")
@@ -288,8 +299,15 @@ class Node(unittest.TestCase):
 
     def test_listens_to_livox_and_to_compressed_images(self):
         for package, end in self.story.other_types.items():
-            print(f"{package}: {end}")
-            self.assertIn("KILV", end)
+            print(f"{package}: {end['estimator'].message}")
+            self.assertIn("KILV", end["estimator"].message)
+
+    def test_listens_to_two_feet(self):
+        end = self.story.two_feet
+        used = {name: int(next(v.value for v in end[name].values if v.key == "used")) for name in ("legs", "lidar", "camera")}
+        print(f"two feet: {end['estimator'].message}, used: {used}")
+        self.assertIn("KILV", end["estimator"].message)
+        self.assertGreater(used["legs"], 2000)
 
     def test_the_map_is_saved(self):
         self.assertTrue(self.story.saved.success, self.story.saved.message)

@@ -132,8 +132,67 @@ uint8 line
 """
 
 
-def to_other_types(source: str, target: str, seconds: float, livox_package: str) -> None:
-    """The beginning of a recording again, its clouds as Livox's driver writes them and its images compressed."""
+class Body:
+    """Where the ankles are on the torso, by the robot's URDF: what a robot knows that sends its feet instead of its joints."""
+
+    LINK, FEET = "torso_link", ("left_ankle_roll_link", "right_ankle_roll_link")
+
+    def __init__(self, urdf: str):
+        import xml.etree.ElementTree
+        numbers = lambda text: [float(word) for word in text.split()]
+        self.joint_above = {}  # of each link
+        for joint in xml.etree.ElementTree.parse(urdf).getroot().iter("joint"):
+            origin, axis = joint.find("origin"), joint.find("axis")
+            assert not any(numbers(origin.get("rpy", "0 0 0")))
+            self.joint_above[joint.find("child").get("link")] = (joint.get("name"), joint.find("parent").get("link"), numbers(origin.get("xyz")),
+                                                                 numbers(axis.get("xyz")) if axis is not None else None)
+
+    def pose(self, link: str, angles: dict):
+        """Of a link on the URDF's root: rotation and position."""
+        import numpy as np
+        if link not in self.joint_above:
+            return np.eye(3), np.zeros(3)
+        name, parent, origin, axis = self.joint_above[link]
+        R, p = self.pose(parent, angles)
+        p = p + R @ np.array(origin)
+        if axis is not None:
+            x, y, z = axis
+            K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+            a = angles.get(name, 0.0)
+            R = R @ (np.eye(3) + np.sin(a) * K + (1 - np.cos(a)) * K @ K)
+        return R, p
+
+    def feet(self, angles: dict) -> list:
+        R, p = self.pose(self.LINK, angles)
+        return [x for foot in self.FEET for x in R.T @ (self.pose(foot, angles)[1] - p)]
+
+    def message(self, joints):
+        """The two-feet message: six positions and six velocities without names."""
+        from sensor_msgs.msg import JointState
+        dt = 1e-4
+        now = dict(zip(joints.name, joints.position))
+        later = {name: angle + dt * rate for name, angle, rate in zip(joints.name, joints.position, joints.velocity)}
+        position = self.feet(now)
+        return JointState(header=joints.header, position=position, velocity=[(b - a) / dt for a, b in zip(position, self.feet(later))])
+
+
+def with_two_feet(config: str, target: str) -> str:
+    """The configuration for such messages."""
+    import yaml
+    with open(config, encoding="utf-8") as file:
+        settings = yaml.safe_load(file)
+    mount = settings["imu"]["T_link_imu"]  # x_link = R x_imu + p
+    R, p = [mount["R"][i:i + 3] for i in (0, 3, 6)], mount["p"]
+    turned = [R[j][i] for i in range(3) for j in range(3)]
+    settings["legs"] = {**settings["legs"], "type": "feet", "sole_offset": 0.035,
+                        "T_imu_feet": {"R": turned, "p": [-sum(turned[3 * i + j] * p[j] for j in range(3)) for i in range(3)]}}
+    with open(target, "w", encoding="utf-8") as file:
+        yaml.safe_dump(settings, file)
+    return target
+
+
+def to_other_types(source: str, target: str, seconds: float, livox_package: str, body: Body | None = None) -> None:
+    """The beginning of a recording again, its clouds as Livox's driver writes them and its images compressed; with `body` its legs as feet."""
     import genpy.dynamic
     import numpy as np
     import rosbag
@@ -162,6 +221,8 @@ def to_other_types(source: str, target: str, seconds: float, livox_package: str)
                     raise ValueError(message.encoding)
                 out.write(topic + "/compressed", CompressedImage(header=message.header, format="png",
                                                                  data=png(message.height, message.width, message.data)), t)
+            elif body is not None and message._type == "sensor_msgs/JointState":
+                out.write(topic, body.message(message), t)
             else:
                 out.write(topic, message, t)
 
