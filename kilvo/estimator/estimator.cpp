@@ -73,6 +73,7 @@ void Estimator::push(Measurement m, std::vector<Output>& out) {
   if (const char* fault = fault_of(m)) return drop(s, fault);
   if (back != nullptr) return drop(s, back);
   if (const char* fault = health_.judge(m)) return drop(s, fault);
+  shift(m);
   if (health_.imu_silence() > blind_gap) lose_imu(out);
   if (const auto refused = timeline_.push(std::move(m))) return drop(s, *refused);
   for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, "time jump");

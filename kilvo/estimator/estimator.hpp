@@ -15,6 +15,7 @@
 #include "kilvo/estimator/recovery.hpp"
 #include "kilvo/estimator/relocate.hpp"
 #include "kilvo/estimator/replay.hpp"
+#include "kilvo/estimator/time_offset.hpp"
 #include "kilvo/estimator/timeline.hpp"
 #include "kilvo/filter/trajectory.hpp"
 #include "kilvo/lidar/undistort.hpp"
@@ -83,6 +84,8 @@ class Estimator {
   Output output_now();                      // with what a sweep and an image left to go out
   void emit(std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0, double contact_us = 0);
 
+  void note_clock_step();
+
   // asynchronous.cpp: IMU and legs
   void handle_imu(ImuSample s, std::vector<Output>& out);
   void handle_legs(const JointSample& s, std::vector<Output>& out);
@@ -102,7 +105,6 @@ class Estimator {
   void refuse_sweep(Time t);
   void note_outage(Time sweep_begin);
   void warn_of_streams();
-  void note_clock_step();
 
   // sequential.cpp: sweeps
   void process_pending(Time until, std::vector<Output>& out);
@@ -111,6 +113,13 @@ class Estimator {
   bool has_no_shape(const Estimate& prior) const;
   void learn(const LidarModel& model, const std::vector<PointCluster>& clusters);  // the map grows
   void settle(const Estimate& e);                                                  // nothing before it will be replayed
+
+  // clocks.cpp: sensors whose stamps are off the IMU's
+  void shift(Measurement& m) const;
+  double least_offset(Sensor s) const;
+  void check_lidar_clock(const Estimate& prior, Time begin, Time end);
+  void check_camera_clock();
+  void move_clock(Sensor s, double by);
 
   // images.cpp
   const char* image_fault(const CameraImage& image);
@@ -121,9 +130,9 @@ class Estimator {
   Eigen::Vector3d position_of(const VisualFrame& frame) const;
   bool is_lost_among_patches(const Estimate& prior) const;
   bool says_nothing(const PhotometricModel::Report& report);
-  void check_mount(const PhotometricModel& model, const SO3& R_WI);
+  void check_mount(const PhotometricModel& model, const SO3& R_WI, const Eigen::Vector3d& omega);
   void learn_from(const SE3& T_CI, const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,
-                  const DepthView& depth, const Estimate& prior);
+                  const DepthView& depth, const Estimate& prior, const Eigen::Vector3d& omega);
 
   Robot robot_;
   EstimatorConfig config_;
@@ -162,15 +171,18 @@ class Estimator {
   std::optional<LegKinematics> kinematics_;
   ContactEstimator contacts_;
   StanceTracker stances_;
-  std::optional<Time> last_legs_;                           // while the legs are used
-  double leg_period_ = 0;                                   // between the last two leg samples, s
-  double closing_us_ = 0;                                   // what it took to close the IMU's intervals since the last leg sample
-  Time last_foothold_{};                                    // when a foot was used last
-  Time last_stance_{};                                      // the same, or since when that is waited for
-  Time last_sweep_{};                                       // end of the last sweep, or the start
-  Time last_middle_{};                                      // of the last sweep
-  std::optional<Time> last_image_;                          // that was used
-  Eigen::Vector3d last_image_p_ = Eigen::Vector3d::Zero();  // m
+  std::optional<Time> last_legs_;  // while the legs are used
+  double leg_period_ = 0;          // between the last two leg samples, s
+  double closing_us_ = 0;          // what it took to close the IMU's intervals since the last leg sample
+  TimeOffset lidar_clock_;
+  std::array<Duration, sensor_count> shift_{};                          // found, and added to the stamps, by Sensor
+  std::array<std::optional<std::size_t>, sensor_count> shift_is_said_;  // by which of the warnings
+  Time last_foothold_{};                                                // when a foot was used last
+  Time last_stance_{};                                                  // the same, or since when that is waited for
+  Time last_sweep_{};                                                   // end of the last sweep, or the start
+  Time last_middle_{};                                                  // of the last sweep
+  std::optional<Time> last_image_;                                      // that was used
+  Eigen::Vector3d last_image_p_ = Eigen::Vector3d::Zero();              // m
   Modality modality_ = Modality::coast;
   const char* cause_ = "start";
   ClockSteps clock_steps_;

@@ -104,7 +104,8 @@ void Estimator::process(const CameraImage& image) {
   };
   estimate_ = tracks.empty() ? prior : update(prior, measured, update_config).posterior;
   if (!keep_finite(true)) return drop(Sensor::camera, "not finite");
-  if (at == image.t) check_mount(model, prior.x.R);
+  const Eigen::Vector3d omega = replay_.gyro_at(image.t).value_or(prior.x.bg) - prior.x.bg;
+  if (at == image.t) check_mount(model, prior.x.R, omega);
   if (says_nothing(model.report())) {
     estimate_ = unlit;
     settle(*estimate_);
@@ -114,7 +115,8 @@ void Estimator::process(const CameraImage& image) {
   trajectory_.correct(at, estimate_->x.pose(), estimate_->x.v - prior.x.v);
   const SE3 T_WI = estimate_->x.pose();
   if (blind && !feet_hold && model.report().used >= enough) note_drift(model.by_frame(), T_WI);
-  learn_from(*T_CI, model, tracks, pyramid, depth, prior);
+  learn_from(*T_CI, model, tracks, pyramid, depth, prior, omega);
+  check_camera_clock();
   settle(*estimate_);
   last_image_p_ = estimate_->x.p;
   if (model.report().used > 0) last_image_ = image.t;
@@ -173,10 +175,11 @@ bool Estimator::says_nothing(const PhotometricModel::Report& report) {
   return nothing && images_in_vain_ <= patient;
 }
 
-void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI) {
+void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI, const Eigen::Vector3d& omega) {
   for (const PhotometricModel::Turn& turn : model.turns()) {
-    const SO3 R_IW = T_CI_.R.inverse() * visual_map_.frame(turn.frame).T_CW.R;
-    mount_check_.add(R_WI, R_IW.inverse(), turn.A, turn.b);
+    const VisualFrame& frame = visual_map_.frame(turn.frame);
+    const SO3 R_IW = T_CI_.R.inverse() * frame.T_CW.R;
+    mount_check_.add({R_WI, omega}, {R_IW.inverse(), frame.omega}, turn.A, turn.b);
   }
   const auto psi = mount_check_.misalignment();
   if (!psi) return;
@@ -194,13 +197,15 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI) {
 }
 
 void Estimator::learn_from(const SE3& T_CI, const PhotometricModel& model, std::span<const Track> tracks,
-                           std::span<const GreyImage> pyramid, const DepthView& depth, const Estimate& prior) {
+                           std::span<const GreyImage> pyramid, const DepthView& depth, const Estimate& prior,
+                           const Eigen::Vector3d& omega) {
   const PoseCovariance known = PoseCovariance::Identity() - weak_;
   const SE3 T_WI = as_the_map_has_it(prior.x, estimate_->x, weak_);
   const SE3 T_CW = T_CI * T_WI.inverse();
   VisualFrame frame;
   frame.T_CW = T_CW;
   frame.tau = estimate_->x.tau;
+  frame.omega = omega;
   frame.error = map_error_.total(T_WI, estimate_->P.topLeftCorner<6, 6>());
   // Along what the LiDAR does not know, the error of this frame is that of the next ones: drift, which the epoch carries.
   const PoseCovariance own = to_origin(T_WI) * known;

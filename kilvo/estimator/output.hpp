@@ -55,16 +55,17 @@ struct SensorCount {
 };
 
 struct Statistics {
-  std::array<SensorCount, sensor_count> sensors;  // by Sensor
-  PointDrops points;                              // LiDAR points not used, by cause
-  std::uint64_t lost_stances = 0;                 // on the legs alone no foot was found for so long that the velocity was given up
-  std::uint64_t unsupported = 0;                  // leg samples in which no foot stood, or stood still enough to be used
-  std::uint64_t rollbacks = 0;                    // a non-finite state was thrown away
-  std::array<StreamHealth, sensor_count> health;  // by Sensor
-  std::uint64_t imu_outages = 0;                  // the IMU was silent for so long that the pose was unknown
-  std::uint64_t clock_steps = 0;                  // the IMU's time went back for good
-  std::uint64_t searches = 0, found = 0;          // sweeps whose pose was searched for, and found
-  std::uint64_t maps_begun_anew = 0;              // because sweeps had fitted nowhere for long
+  std::array<SensorCount, sensor_count> sensors;   // by Sensor
+  PointDrops points;                               // LiDAR points not used, by cause
+  std::uint64_t lost_stances = 0;                  // on the legs alone no foot was found for so long that the velocity was given up
+  std::uint64_t unsupported = 0;                   // leg samples in which no foot stood, or stood still enough to be used
+  std::uint64_t rollbacks = 0;                     // a non-finite state was thrown away
+  std::array<StreamHealth, sensor_count> health;   // by Sensor
+  std::uint64_t imu_outages = 0;                   // the IMU was silent for so long that the pose was unknown
+  std::array<double, sensor_count> clock_shift{};  // by Sensor: s, found to be missing from the stamps, and added since
+  std::uint64_t clock_steps = 0;                   // the IMU's time went back for good
+  std::uint64_t searches = 0, found = 0;           // sweeps whose pose was searched for, and found
+  std::uint64_t maps_begun_anew = 0;               // because sweeps had fitted nowhere for long
   bool diverged = false;
   std::vector<std::string> warnings;  // each said once
 };

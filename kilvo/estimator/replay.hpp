@@ -23,6 +23,9 @@ class Replay {
   /// The IMU was silent within [begin, end], for so long that nothing is known of the motion.
   bool is_blind(Time begin, Time end) const;
 
+  /// What the gyroscope said, rad/s; none within a gap.
+  std::optional<Eigen::Vector3d> gyro_at(Time t) const;
+
   bool has_imu() const { return !imu_.empty(); }
   const ImuSample& newest_imu() const { return imu_.back(); }
   /// The stamp of the newest IMU sample that is not after t; before all times when there is none.
@@ -62,7 +65,6 @@ class Replay {
   void say_clipped(ImuInterval& interval) const;
   void say_missed(ImuInterval& interval, double gap) const;
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
-  std::optional<Eigen::Vector3d> gyro_at(Time t) const;  // none within a gap
   FootOrientations standing_at(Time t) const;
 
   struct Told {

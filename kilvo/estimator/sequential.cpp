@@ -117,6 +117,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
 
   const SE3 T_WI = estimate_->x.pose();
   if (good) {
+    check_lidar_clock(prior, begin_of(scan), end);
     trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
     weak_ = weak_part(model.report().degeneracy);
     if (!first) replay_.sweep_told(end, told_share<at::R>(prior, *estimate_), told_share<at::p>(prior, *estimate_));

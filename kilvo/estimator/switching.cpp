@@ -232,14 +232,6 @@ void Estimator::note_outage(Time sweep_begin) {
     recovery_.sweeps_to_go = std::max(recovery_.sweeps_to_go, consistent_sweeps);
 }
 
-void Estimator::note_clock_step() {
-  statistics_.clock_steps = clock_steps_.count();
-  constexpr std::uint64_t most = 10;
-  if (clock_steps_.count() > most) return;
-  statistics_.warnings.push_back("the IMU's clock went back by " + milliseconds_of(to_seconds(clock_steps_.last())) +
-                                 ": the outputs' stamps go on as if it had not");
-}
-
 // What the streams themselves showed; what could not be used is said elsewhere.
 void Estimator::warn_of_streams() {
   statistics_.health = health_.streams();

@@ -26,7 +26,8 @@ struct Patch {
 
 struct VisualFrame {
   SE3 T_CW;
-  double tau = 1;  // inverse exposure
+  double tau = 1;                                   // inverse exposure
+  Eigen::Vector3d omega = Eigen::Vector3d::Zero();  // the body's angular rate, rad/s, in its own frame
   /// What the whole pose is wrong by, with the drift that images share: a covariance as `noise` is.
   Eigen::Matrix<double, 6, 6> error = Eigen::Matrix<double, 6, 6>::Zero();
   /// Covariance of what is this frame's own in the error of (rotation, position, tau): the pose as a twist of the world at its origin.

@@ -182,6 +182,21 @@ TEST_F(Faults, AnImuThatComesLateIsNoFaultOfTheOthers) {
 }
 
 // KILVO_SEEDS=20 kilvo_faults_test --gtest_filter=Coasting.*
+// Stamps that are off by a hundredth of a second are found out, named and corrected; those of the walk as it is are left alone.
+TEST(Clocks, ALidarsOffsetIsFoundAndMended) {
+  const FailingWalk walk("room", 2, 30);
+  const double error = walk.with({}).rms_error();
+  for (const double offset : {0.012, -0.018}) {
+    const Outcome o = walk.with({{FailureKind::time_jump, Sensor::lidar, 0, for_ever, offset}});
+    const double found = o.statistics.clock_shift[static_cast<std::size_t>(Sensor::lidar)];
+    std::printf("offset %.1f ms: found %.2f ms; error %.2f mm, without %.2f mm, at the end %.2f mm\n", 1e3 * offset, -1e3 * found,
+                1e3 * o.rms_error(), 1e3 * error, 1e3 * o.moments.back().error);
+    EXPECT_NEAR(found, -offset, 0.002);
+    EXPECT_THAT(o.statistics.warnings, testing::Contains(testing::HasSubstr("set lidar.time_offset to")));
+    EXPECT_LT(o.rms_error(), 0.02);
+  }
+}
+
 TEST(Coasting, ForTwoSecondsSigmaIsAboutTheError) {
   const char* text = std::getenv("KILVO_SEEDS");
   const int seeds = text != nullptr ? std::atoi(text) : 4;

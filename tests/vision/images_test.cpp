@@ -104,6 +104,17 @@ TEST_F(Images, HelpAndTheExposureIsFollowed) {
   EXPECT_THAT(with.statistics.warnings, testing::Not(testing::Contains(HasSubstr("turned"))));
 }
 
+TEST_F(Images, OfAClockThatIsOffAreShifted) {
+  const auto camera = static_cast<std::size_t>(Sensor::camera);
+  const Drive late = drive(liv, [](CameraImage& i, double) {
+    i.t += std::chrono::milliseconds(15);
+    return true;
+  });
+  EXPECT_NEAR(late.statistics.clock_shift[camera], -0.015, 0.004) << "of small images, after ten seconds";
+  EXPECT_THAT(late.statistics.warnings, testing::Contains(HasSubstr("set camera.time_offset to")));
+  EXPECT_EQ(drive(liv).statistics.clock_shift[camera], 0);
+}
+
 TEST_F(Images, ACameraThatGoesIsMissedAndOneThatComesBackIsUsed) {
   const Drive d = drive(liv, [](CameraImage&, double t) { return t < 4 || t > 7; });
   EXPECT_NEAR(d.outputs.at(Modality::li) / 200.0, 3 - 0.3, 0.6);

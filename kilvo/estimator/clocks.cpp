@@ -1,0 +1,79 @@
+// Clocks: of all sensors at once that step back, and of one that is not the IMU's.
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "kilvo/estimator/estimator.hpp"
+
+namespace kilvo {
+namespace {
+
+// Offsets below are of no consequence, or a model's error; once there is one, it is found as exactly as the data allows, s.
+constexpr double worth_moving = 2e-3, worth_refining = 5e-4;
+
+std::string decimals(const char* format, double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+}  // namespace
+
+void Estimator::note_clock_step() {
+  statistics_.clock_steps = clock_steps_.count();
+  constexpr std::uint64_t most = 10;
+  if (clock_steps_.count() > most) return;
+  statistics_.warnings.push_back("the IMU's clock went back by " + decimals("%.0f", 1e3 * to_seconds(clock_steps_.last())) +
+                                 " ms: the outputs' stamps go on as if it had not");
+}
+
+void Estimator::shift(Measurement& m) const {
+  const Duration by = shift_[static_cast<std::size_t>(sensor_of(m))];
+  if (auto* scan = std::get_if<LidarScan>(&m)) scan->t += by;
+  if (auto* image = std::get_if<CameraImage>(&m)) image->t += by;
+}
+
+double Estimator::least_offset(Sensor s) const {
+  return shift_[static_cast<std::size_t>(s)] == Duration(0) ? worth_moving : worth_refining;
+}
+
+// A sweep that lasted from `begin` to `end` turned the state from `prior` to what it is.
+void Estimator::check_lidar_clock(const Estimate& prior, Time begin, Time end) {
+  const auto first = trajectory_.at(begin), last = trajectory_.at(end);
+  if (!first || !last || end <= begin || !weak_.isZero(0) || recovery_.sweeps_to_go > 0) return;
+  const Eigen::Vector3d rate = (first->R.inverse() * last->R).Log() / to_seconds(end - begin);
+  lidar_clock_.add((prior.x.R.inverse() * estimate_->x.R).Log(), rate);
+  if (lidar_clock_.is_doubtful()) mount_check_ = MountCheck();  // it may see nothing but this
+  const auto offset = lidar_clock_.offset(least_offset(Sensor::lidar));
+  if (!offset) return;
+  lidar_clock_.restart();
+  move_clock(Sensor::lidar, *offset);
+}
+
+// What the images say of the mount and of the clock, they say of views that were taken by the clock as it was.
+void Estimator::check_camera_clock() {
+  const auto offset = mount_check_.time_offset(least_offset(Sensor::camera));
+  if (!offset) return;
+  mount_check_ = MountCheck();
+  visual_map_ = VisualMap(config_.visual_map);
+  move_clock(Sensor::camera, *offset);
+}
+
+void Estimator::move_clock(Sensor sensor, double by) {
+  constexpr double longest = 0.2;  // s
+  const auto s = static_cast<std::size_t>(sensor);
+  const double configured = sensor == Sensor::lidar ? robot_.lidar.time_offset : robot_.camera.time_offset;
+  const double total = std::clamp(to_seconds(shift_[s]) + by, -longest, longest);
+  shift_[s] = from_seconds(total);
+  statistics_.clock_shift[s] = total;
+  const std::string name = name_of(sensor);
+  if (!shift_is_said_[s]) {
+    shift_is_said_[s] = statistics_.warnings.size();
+    statistics_.warnings.emplace_back();
+  }
+  statistics_.warnings[*shift_is_said_[s]] =
+      name + ": its clock is " + decimals("%.1f", 1e3 * std::abs(total)) + " ms " + (total > 0 ? "behind" : "ahead of") +
+      " the IMU's, and is corrected from when that was seen: set " + name + ".time_offset to " + decimals("%.4f", configured + total);
+}
+
+}  // namespace kilvo
