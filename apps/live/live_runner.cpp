@@ -69,7 +69,8 @@ void LiveRunner::note_clock_steps() {
   statistics_.clock_steps = clock_steps_.count();
   constexpr std::uint64_t most = 10;
   if (clock_steps_.count() > most) return;
-  warn("the IMU's clock went back by " + std::to_string(std::lround(1e3 * to_seconds(clock_steps_.last()))) +
+  const long back = std::lround(1e3 * to_seconds(clock_steps_.last()));
+  warn(std::string("the IMU's clock went ") + (back > 0 ? "back" : "ahead") + " by " + std::to_string(std::abs(back)) +
        " ms: the outputs' stamps go on as if it had not");
 }
 

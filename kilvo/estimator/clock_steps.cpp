@@ -13,6 +13,8 @@ constexpr Duration least_step = std::chrono::milliseconds(15);
 constexpr int witnesses = 10, few_witnesses = 3, votes = 3;
 // Samples that follow each other are no farther apart.
 constexpr Duration longest_interval = std::chrono::milliseconds(100);
+// Legs that come as often are a clock.
+constexpr Duration often = std::chrono::milliseconds(5);
 // For so long nobody else need speak for a step to be believed; so long after it the others show whether they went with it.
 constexpr Duration patience = std::chrono::seconds(1);
 // The years 1933 to 2116; and steps of 36 years in all. Beyond, differences of times are no times any more.
@@ -26,8 +28,14 @@ double distance(Duration a, Duration b) { return std::abs(to_seconds(a) - to_sec
 const char* ClockSteps::follow_imu(Time t) {
   Duration& offset = offset_[static_cast<std::size_t>(Sensor::imu)];
   const Time now = t + offset;
-  if (!imu_ || (now > *imu_ - least_step && now < *imu_ + longest_interval)) {
+  const bool near = !imu_ || (now > *imu_ - least_step && now < *imu_ + longest_interval);
+  const bool alone_ahead = imu_ && now > *imu_ + least_step && has_run_ahead(now);
+  if (near && !alone_ahead) {
+    if (imu_ && now > *imu_) period_ = std::min(now - *imu_, period_ + period_ / 8);
+    // The most of lately: less, when the IMU comes late.
+    if (legs_) legs_behind_ = std::max(now - *legs_, legs_behind_.value_or(now - *legs_) - period_ / 512);
     elsewhere_ = 0;
+    legs_then_ = legs_;
     imu_ = std::max(imu_.value_or(now), now);
     return nullptr;
   }
@@ -38,15 +46,19 @@ const char* ClockSteps::follow_imu(Time t) {
   }
   elsewhere_ = goes_on ? elsewhere_ + 1 : 1;
   newest_there_ = now;
-  const bool back = now < *imu_;  // ahead, it may be a mistake: the timeline looks into that
-  const bool seconded = back && elsewhere_ >= few_witnesses && for_ >= votes && for_ > against_;
-  if (!seconded && (elsewhere_ < witnesses || (back && !is_sure()))) return back ? "its clock went back" : nullptr;
+  const bool back = now < *imu_;
+  const bool with_others = for_ >= votes && for_ > against_, alone = against_ >= votes && against_ > for_ && legs_spacing_ < often;
+  const bool seconded = elsewhere_ >= few_witnesses && (alone || (back && with_others));
+  if (back && !seconded && (elsewhere_ < witnesses || !is_sure())) return "its clock went back";
+  if (alone_ahead && !seconded && elsewhere_ < witnesses) return "its clock went ahead";
+  if (!back && !alone_ahead && elsewhere_ < witnesses) return nullptr;
   const int there = std::exchange(elsewhere_, 0);
-  if (!back) return imu_ = now, nullptr;
+  // Ahead with all the others, it is a gap, or a mistake: the timeline looks into that.
+  if (!back && !(alone_ahead && seconded)) return imu_ = now, nullptr;
   // Nothing is missing: the first of them came one period after the newest before.
   const Duration period = (now - first_there_) / (there - 1);
   last_ = *imu_ + period - first_there_;
-  if (offset + last_ > largest_offset) return "its clock went back";
+  if (offset + last_ > largest_offset || offset + last_ < -largest_offset) return "its clock went back";
   ++count_;
   open_until_.fill(std::nullopt);
   open_.fill(true);
@@ -55,17 +67,30 @@ const char* ClockSteps::follow_imu(Time t) {
   return nullptr;
 }
 
-// The IMU alone may just be late: the others must have gone back as well. When nobody else speaks, nobody is contradicted.
+// The others must have said whether they went back as well; when nobody else speaks, nobody is asked.
 bool ClockSteps::is_sure() const {
   const bool alone = std::ranges::none_of(lag_, [](const auto& lag) { return lag.has_value(); });
-  return alone || for_ > against_ || (for_ + against_ == 0 && newest_there_ - first_there_ > patience);
+  return alone || for_ + against_ > 0 || newest_there_ - first_there_ > patience;
+}
+
+// The IMU's time has gone on by more than that of the legs. In a gap they go on as well.
+bool ClockSteps::has_run_ahead(Time now) const {
+  if (!legs_behind_ || !legs_then_ || legs_spacing_ > often) return false;
+  const bool legs_went_on = *legs_ - *legs_then_ > (now - *imu_) / 2;
+  return !legs_went_on && now - std::max(*imu_, *legs_ + *legs_behind_) > least_step + period_;
 }
 
 void ClockSteps::vote(std::size_t s, Time t) {
   if (!lag_[s]) return;
   const Duration step = *imu_ - first_there_;
   const Duration stays = *imu_ + (newest_there_ - first_there_) - (t + offset_[s]);
-  ++(distance(stays, *lag_[s] + step) < distance(stays, *lag_[s]) ? for_ : against_);
+  const double with_it = distance(stays, *lag_[s] + step), without_it = distance(stays, *lag_[s]);
+  if (std::min(with_it, without_it) > 0.5 * std::abs(to_seconds(step))) return;  // late by something else
+  ++(with_it < without_it ? for_ : against_);
+}
+
+void ClockSteps::put(Measurement& m, std::size_t s) const {
+  std::visit([&](auto& x) { x.t += offset_[s]; }, m);
 }
 
 const char* ClockSteps::follow(Measurement& m) {
@@ -75,7 +100,14 @@ const char* ClockSteps::follow(Measurement& m) {
   if (t < earliest || t > latest) return "absurd stamp";
   if (sensor == Sensor::imu) {
     if (const char* fault = follow_imu(t)) return fault;
-  } else if (imu_ && elsewhere_ == 0) {
+    return put(m, s), nullptr;
+  }
+  if (sensor == Sensor::legs) {
+    const Time now = t + offset_[s];
+    if (legs_ && now > *legs_) legs_spacing_ = std::min(now - *legs_, legs_spacing_ + legs_spacing_ / 8);
+    legs_ = now;
+  }
+  if (imu_ && elsewhere_ == 0) {
     // Of the IMU's clock, or of one of its own that did not step: the messages come as long after the IMU's as ever.
     const Duration imu_offset = offset_[static_cast<std::size_t>(Sensor::imu)];
     const Duration stays = *imu_ - (t + offset_[s]), steps = *imu_ - (t + imu_offset);
@@ -89,8 +121,7 @@ const char* ClockSteps::follow(Measurement& m) {
   } else if (imu_) {
     vote(s, t);
   }
-  std::visit([&](auto& x) { x.t += offset_[s]; }, m);
-  return nullptr;
+  return put(m, s), nullptr;
 }
 
 }  // namespace kilvo

@@ -1,5 +1,5 @@
-// Clocks that step back: the computer's time was set, or a recording is played in a loop. What comes after the step is put after what came
-// before, as it was measured.
+// Clocks that step back: the computer's time was set, or a recording is played in a loop; and an IMU whose clock steps either way by
+// itself, which the legs tell. What comes after the step is put after what came before, as it was measured.
 #pragma once
 
 #include <array>
@@ -16,13 +16,15 @@ class ClockSteps {
   /// the IMU's time has gone back, and whether it stays so is not known yet. Such a one is left as it is.
   const char* follow(Measurement& m);
 
-  /// How often the IMU's time went back for good, and by how much at the last time.
+  /// How often the IMU's time stepped for good, and by how much it went back at the last time (ahead: negative).
   std::uint64_t count() const { return count_; }
   Duration last() const { return last_; }
 
  private:
   const char* follow_imu(Time t);
   bool is_sure() const;
+  bool has_run_ahead(Time now) const;
+  void put(Measurement& m, std::size_t s) const;
   void vote(std::size_t s, Time t);
 
   std::array<Duration, sensor_count> offset_{};  // added to the stamps, by Sensor
@@ -31,7 +33,12 @@ class ClockSteps {
   // Whether each goes with the IMU is found out from its first messages after a step.
   std::array<bool, sensor_count> open_{};
   std::array<std::optional<Time>, sensor_count> open_until_;
-  std::optional<Time> imu_;              // the newest, with its offset
+  std::optional<Time> imu_;                    // the newest, with its offset
+  Duration period_ = std::chrono::seconds(1);  // of the IMU, lately
+  std::optional<Time> legs_;                   // the newest, with its offset
+  std::optional<Time> legs_then_;              // when the IMU spoke last
+  std::optional<Duration> legs_behind_;        // by which they trail the IMU when it speaks
+  Duration legs_spacing_ = std::chrono::seconds(1);
   int elsewhere_ = 0;                    // IMU samples in a row of another time
   Time first_there_{}, newest_there_{};  // of them
   int for_ = 0, against_ = 0;            // messages of the others meanwhile that went with them, and that did not

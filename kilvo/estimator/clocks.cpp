@@ -23,8 +23,9 @@ void Estimator::note_clock_step() {
   statistics_.clock_steps = clock_steps_.count();
   constexpr std::uint64_t most = 10;
   if (clock_steps_.count() > most) return;
-  statistics_.warnings.push_back("the IMU's clock went back by " + decimals("%.0f", 1e3 * to_seconds(clock_steps_.last())) +
-                                 " ms: the outputs' stamps go on as if it had not");
+  const double back = to_seconds(clock_steps_.last());
+  statistics_.warnings.push_back(std::string("the IMU's clock went ") + (back > 0 ? "back" : "ahead") + " by " +
+                                 decimals("%.0f", 1e3 * std::abs(back)) + " ms: the outputs' stamps go on as if it had not");
 }
 
 void Estimator::shift(Measurement& m) const {
