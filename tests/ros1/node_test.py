@@ -155,8 +155,8 @@ class Story:
         bag = os.path.join(self.folder, f"{package}.bag")
         ros_world.to_other_types(self.bag, bag, 4.0, package, body)
         self.start_anew(config)
-        player = Process("rosbag", "play", "-q", "-d", "1.0", bag)
-        wait_until(lambda: self.ears.newest_status("estimator") and "KILV" in self.ears.newest_status("estimator").message, 15)
+        player = ros_world.player(bag, ARGUMENTS.speed)
+        wait_until(lambda: self.ears.newest_status("estimator") and "KILV" in self.ears.newest_status("estimator").message, 15 / ARGUMENTS.speed)
         player.wait()
         return {name: self.ears.newest_status(name) for name in ("estimator", "legs", "lidar", "camera")}
 
