@@ -1,8 +1,9 @@
 // Clocks: of all sensors at once that step back, and of one that is not the IMU's.
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
+#include "kilvo/estimator/decimals.hpp"
 #include "kilvo/estimator/estimator.hpp"
 
 namespace kilvo {
@@ -10,12 +11,6 @@ namespace {
 
 // Offsets below are of no consequence, or a model's error; once there is one, it is found as exactly as the data allows, s.
 constexpr double worth_moving = 2e-3, worth_refining = 5e-4;
-
-std::string decimals(const char* format, double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
 
 }  // namespace
 
@@ -25,7 +20,7 @@ void Estimator::note_clock_step() {
   if (clock_steps_.count() > most) return;
   const double back = to_seconds(clock_steps_.last());
   statistics_.warnings.push_back(std::string("the IMU's clock went ") + (back > 0 ? "back" : "ahead") + " by " +
-                                 decimals("%.0f", 1e3 * std::abs(back)) + " ms: the outputs' stamps go on as if it had not");
+                                 decimals(1e3 * std::abs(back), 0) + " ms: the outputs' stamps go on as if it had not");
 }
 
 void Estimator::shift(Measurement& m) const {
@@ -73,8 +68,8 @@ void Estimator::move_clock(Sensor sensor, double by) {
     statistics_.warnings.emplace_back();
   }
   statistics_.warnings[*shift_is_said_[s]] =
-      name + ": its clock is " + decimals("%.1f", 1e3 * std::abs(total)) + " ms " + (total > 0 ? "behind" : "ahead of") +
-      " the IMU's, and is corrected from when that was seen: set " + name + ".time_offset to " + decimals("%.4f", configured + total);
+      name + ": its clock is " + decimals(1e3 * std::abs(total), 1) + " ms " + (total > 0 ? "behind" : "ahead of") +
+      " the IMU's, and is corrected from when that was seen: set " + name + ".time_offset to " + decimals(configured + total, 4);
 }
 
 }  // namespace kilvo

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kilvo/estimator/decimals.hpp"
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/estimator/stopwatch.hpp"
 #include "kilvo/filter/pose_error.hpp"
@@ -184,11 +185,7 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI, cons
   const auto psi = mount_check_.misalignment();
   if (!psi) return;
   mount_is_doubted_ = true;
-  const auto tenths = [](double value) {
-    std::string text = std::to_string(std::round(10 * value) / 10);
-    text.resize(text.find('.') + 2);
-    return text;
-  };
+  const auto tenths = [](double value) { return decimals(value, 1); };
   const Eigen::Vector3d degrees = *psi * (180 / M_PI);
   statistics_.warnings.push_back("the images fit a camera that is turned by " + tenths(degrees.norm()) + " degrees or more (" +
                                  tenths(degrees.x()) + ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()) +

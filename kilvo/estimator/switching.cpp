@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "kilvo/estimator/decimals.hpp"
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/estimator/silence.hpp"
 #include "kilvo/filter/update.hpp"
@@ -33,7 +34,7 @@ bool contradicts_map(const RegistrationReport& report) {
   return met > known_share * report.clusters && report.matched < agreeing_share * met;
 }
 
-std::string milliseconds_of(double seconds) { return std::to_string(std::lround(1e3 * seconds)) + " ms"; }
+std::string milliseconds_of(double seconds) { return decimals(1e3 * seconds, 0) + " ms"; }
 
 }  // namespace
 
