@@ -1,5 +1,6 @@
 #include "apps/live/thread_settings.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <ctime>
 #include <pthread.h>
@@ -10,11 +11,11 @@ namespace kilvo::live {
 std::string settle_thread(const ThreadSettings& settings) {
   std::string out;
   pthread_setname_np(pthread_self(), settings.name);
-  if (settings.priority > 0) {
+  if (settings.priority != 0) {
     sched_param parameters{};
-    parameters.sched_priority = settings.priority;
-    if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters); error != 0)
-      out += std::string(settings.name) + ": no real-time priority (" + std::strerror(error) + "); ";
+    parameters.sched_priority = std::max(1, settings.priority);
+    const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+    if (error != 0 && settings.priority > 0) out += std::string(settings.name) + ": no real-time priority (" + std::strerror(error) + "); ";
   }
   if (settings.core >= 0) {
     cpu_set_t cores;

@@ -42,7 +42,7 @@ constexpr std::pair<std::string_view, Range> ranges[] = {
     {"legs.gate", above_zero()},
     {"estimator.smooth_time", above_zero(60)},
     {"live.max_latency", above_zero(10)},
-    {"live.priority", up_to(99)},
+    {"live.priority", {-1, 99}},
     {"live.fast_core", {-1, 1023}},
     {"live.slow_core", {-1, 1023}},
     {"legs.foot_noise", up_to(10)},
