@@ -1,10 +1,10 @@
 #include "apps/live/live_runner.hpp"
 
-#include <cmath>
 #include <utility>
 
 #include "apps/live/raw.hpp"
 #include "apps/live/thread_settings.hpp"
+#include "kilvo/estimator/clock_step_warning.hpp"
 #include "kilvo/estimator/fault.hpp"
 
 namespace kilvo::live {
@@ -69,9 +69,7 @@ void LiveRunner::note_clock_steps() {
   statistics_.clock_steps = clock_steps_.count();
   constexpr std::uint64_t most = 10;
   if (clock_steps_.count() > most) return;
-  const long back = std::lround(1e3 * to_seconds(clock_steps_.last()));
-  warn(std::string("the IMU's clock went ") + (back > 0 ? "back" : "ahead") + " by " + std::to_string(std::abs(back)) +
-       " ms: the outputs' stamps go on as if it had not");
+  warn(warning_of_last(clock_steps_));
 }
 
 bool LiveRunner::is_idle() const {

@@ -33,7 +33,7 @@ struct LiveStatistics {
   std::uint64_t dropped_outputs = 0;                  // that nobody carried away in time
   std::map<std::string, std::size_t> deepest;         // queue -> most that waited in it
   std::map<std::string, double> cpu_seconds;          // thread -> time
-  std::uint64_t clock_steps = 0;                      // the IMU's time went back for good
+  std::uint64_t clock_steps = 0;                      // the IMU's time stepped for good
   std::vector<std::string> warnings;
 };
 

@@ -13,7 +13,7 @@ namespace kilvo {
 class ClockSteps {
  public:
   /// Takes the measurements in the order of their arrival and puts each onto the time axis of the first. Says why one is not to be used:
-  /// the IMU's time has gone back, and whether it stays so is not known yet. Such a one is left as it is.
+  /// the IMU's time has stepped, and whether it stays so is not known yet. Such a one is left as it is.
   const char* follow(Measurement& m);
 
   /// How often the IMU's time stepped for good, and by how much it went back at the last time (ahead: negative).

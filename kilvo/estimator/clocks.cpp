@@ -1,8 +1,9 @@
-// Clocks: of all sensors at once that step back, and of one that is not the IMU's.
+// Clocks: those that step, and one of a sensor that is not the IMU's.
 #include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "kilvo/estimator/clock_step_warning.hpp"
 #include "kilvo/estimator/decimals.hpp"
 #include "kilvo/estimator/estimator.hpp"
 
@@ -18,9 +19,7 @@ void Estimator::note_clock_step() {
   statistics_.clock_steps = clock_steps_.count();
   constexpr std::uint64_t most = 10;
   if (clock_steps_.count() > most) return;
-  const double back = to_seconds(clock_steps_.last());
-  statistics_.warnings.push_back(std::string("the IMU's clock went ") + (back > 0 ? "back" : "ahead") + " by " +
-                                 decimals(1e3 * std::abs(back), 0) + " ms: the outputs' stamps go on as if it had not");
+  statistics_.warnings.push_back(warning_of_last(clock_steps_));
 }
 
 void Estimator::shift(Measurement& m) const {

@@ -63,7 +63,7 @@ struct Statistics {
   std::array<StreamHealth, sensor_count> health;   // by Sensor
   std::uint64_t imu_outages = 0;                   // the IMU was silent for so long that the pose was unknown
   std::array<double, sensor_count> clock_shift{};  // by Sensor: s, found to be missing from the stamps, and added since
-  std::uint64_t clock_steps = 0;                   // the IMU's time went back for good
+  std::uint64_t clock_steps = 0;                   // the IMU's time stepped for good
   std::uint64_t searches = 0, found = 0;           // sweeps whose pose was searched for, and found
   std::uint64_t maps_begun_anew = 0;               // because sweeps had fitted nowhere for long
   bool diverged = false;
