@@ -32,10 +32,11 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
     estimate_ = closed_;  // should all of it wait, or be dropped
     process_pending(s.t, out);
     closed_ = *estimate_;
+    replay_.forget_taken();
   }
   Stopwatch watch;
   replay_.remember(closed_);
-  replay_.advance(closed_, s.t, &trajectory_);
+  replay_.close(closed_, *estimate_, s.t, &trajectory_);
   estimate_ = closed_;
   closing_us_ = last_legs_ ? closing_us_ + watch.lap_us() : 0;
   keep_finite();

@@ -17,8 +17,7 @@ Footfall take_step(const Feet& feet, Estimate& e, ContactEstimator& contacts, St
   contacts.update(feet, x, omega, replay.newest_imu().accel - x.ba, sigma_v, map);
   out.contact_us = watch.lap_us();
   out.step = stances.step(feet, contacts, x, omega, sigma_v, map, ground);
-  replay.add(out.step);
-  out.passed = replay.apply(e, out.step);
+  out.passed = replay.take(e, out.step);
   stances.judge(out.step, out.passed);
   return out;
 }

@@ -18,7 +18,7 @@ Forerunner::Forerunner(const Robot& robot, const EstimatorConfig& config)
 void Forerunner::close(Time until) {
   const Time newest = replay_.newest_imu_by(until);
   if (newest <= closed_.t) return;
-  replay_.advance(closed_, newest, nullptr);
+  replay_.close(closed_, now_, newest, nullptr);
   now_ = closed_;
   replay_.forget_before(closed_.t);
   // A sample of the IMU that came after leg samples of later stamps.

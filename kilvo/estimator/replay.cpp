@@ -123,6 +123,7 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
       interval.gyro_scale *= 1 - told_.rotation;
       interval.velocity_scale *= 1 - told_.position;
     }
+    interval.made_biases = interval.end <= rest_until_;
     e = predict(e, interval, feet, config_.noise);
     if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
   };
@@ -153,7 +154,7 @@ std::optional<Eigen::Vector3d> Replay::gyro_at(Time t) const {
   return a.gyro + (to_seconds(t - a.t) / to_seconds(next->t - a.t)) * (next->gyro - a.gyro);
 }
 
-std::array<bool, 2> Replay::apply(Estimate& e, const LegStep& step) const {
+LegModel::Used Replay::apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept) const {
   bool any = false;
   for (std::size_t side = 0; side < 2; ++side) {
     const Stance& foot = step.foot[side];
@@ -165,13 +166,50 @@ std::array<bool, 2> Replay::apply(Estimate& e, const LegStep& step) const {
   if (!any || imu_.empty()) return {};
   // Without a rate the velocity of a foot that is a leg away from the IMU is anything.
   const auto gyro = gyro_at(step.t);
-  if (!gyro) return {step.foot[0].used, step.foot[1].used};
-  LegModel model(step, *gyro, config_.legs);
+  if (!gyro) return {{step.foot[0].used, step.foot[1].used}, {}};
+  LegModel model(step, *gyro, config_.legs, step.t > rest_until_ ? config_.noise.gyro : 0);
   // The rows are nearly linear: one iteration.
   UpdateConfig once;
   once.max_iterations = 1;
-  e = update(e, model, once).posterior;
-  return model.passed();
+  e = update(e, model, once, nullptr, kept).posterior;
+  return model.used();
+}
+
+std::array<bool, 2> Replay::take(Estimate& e, const LegStep& step) {
+  steps_.push_back(step);
+  if (taken_.size() == most_taken) return apply(e, step).motion;
+  Taken& taken = taken_.emplace_back();
+  taken.t = step.t;
+  return (taken.used = apply(e, step, &taken.gain)).motion;
+}
+
+bool Replay::retrace(Estimate& e, const Estimate& live, Time until, Trajectory* record) const {
+  if (imu_.size() < 2 || imu_.back().t != until || steps_.empty() || live.t != steps_.back().t) return false;
+  const ImuSample &a = imu_[imu_.size() - 2], &b = imu_.back();
+  auto step = std::upper_bound(steps_.begin(), steps_.end(), e.t, [](Time t, const LegStep& s) { return t < s.t; });
+  const auto same_time = [](const Taken& taken, const LegStep& s) { return taken.t == s.t; };
+  const auto taken = std::find_if(taken_.begin(), taken_.end(), [&e](const Taken& k) { return k.t > e.t; });
+  if (a.t > e.t || !std::equal(taken, taken_.end(), step, steps_.end(), same_time)) return false;
+  // What is only known now that the second sample has come: a gap, a jump, the end of its range.
+  const ImuInterval whole = interval_between(a, b, e.t, until, e.x);
+  if (whole.gyro_scale != 1 || whole.accel_scale != 1) return false;
+  for (auto k = taken; k != taken_.end(); ++k, ++step) {
+    const ImuInterval interval = ImuInterval::between(a, b, e.t, step->t);
+    e.x = predict_mean(e.x, interval);
+    e.t = step->t;
+    place_stances(e.x, *step);
+    const auto r = LegModel::residual(*step, e.x, interval.gyro_end, k->used);
+    if (r.size() > 0) e.x = boxplus(e.x, k->gain.step(r));
+    if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
+  }
+  e.P = live.P;
+  predict_to(e, until, record);
+  return true;
+}
+
+void Replay::close(Estimate& closed, const Estimate& live, Time until, Trajectory* record) {
+  if (!retrace(closed, live, until, record)) advance(closed, until, record);
+  taken_.clear();
 }
 
 void Replay::advance(Estimate& e, Time until, Trajectory* record) const {
@@ -200,6 +238,7 @@ void Replay::copy_since(Time t, const Replay& other) {
     if (i + 1 >= other.steps_.size() || other.steps_[i + 1].t > t) steps_.push_back(other.steps_[i]);
   }
   told_ = other.told_;
+  rest_until_ = other.rest_until_;
   usual_ = other.usual_;
 }
 

@@ -2,6 +2,7 @@
 // or again after a sweep has corrected its beginning.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -14,7 +15,10 @@ namespace kilvo {
 
 class Replay {
  public:
-  explicit Replay(const EstimatorConfig& config) : config_(config) { remembered_.reserve(most_remembered); }
+  explicit Replay(const EstimatorConfig& config) : config_(config) {
+    remembered_.reserve(most_remembered);
+    taken_.reserve(most_taken);
+  }
 
   /// In time order, each kind by itself.
   void add(const ImuSample& s);
@@ -38,12 +42,22 @@ class Replay {
   /// Predicts e to `until` without looking at the legs.
   void predict_to(Estimate& e, Time until, Trajectory* record) const;
 
-  /// Applies one leg step to e, which must be of its time. Returns which feet of it were used and not refused.
-  std::array<bool, 2> apply(Estimate& e, const LegStep& step) const;
+  /// Adds a leg step and applies it to e, which must be of its time. Returns which feet of it were used and not refused.
+  std::array<bool, 2> take(Estimate& e, const LegStep& step);
+
+  /// Brings `closed`, of the time of an IMU sample, to that of a later one: as advance() does, at a third of the cost when `live` went that
+  /// way with the first sample held and took the steps. The mean goes it again with both samples and the gains of then; the covariance,
+  /// which they hardly change, is that of `live`.
+  void close(Estimate& closed, const Estimate& live, Time until, Trajectory* record);
 
   /// A sweep until `end` has been used with points that the IMU's motion took to its middle: what they told of the pose holds these shares
   /// of what the IMU will get wrong in rotation and in position until then.
   void sweep_told(Time end, double rotation, double position) { told_ = {end, rotation, position}; }
+
+  /// The robot stood still until `end`, and the first biases are the means of what the IMU said until then.
+  void began_at_rest(Time end) { rest_until_ = end; }
+  /// How much of the last `span` before `t` was after that.
+  Duration since_rest(Time t, Duration span) const { return t <= rest_until_ ? Duration(0) : std::min(span, t - rest_until_); }
 
   /// `e` came from the oldest estimate that will be replayed by advance(): a way to a later time may begin there instead.
   void remember(const Estimate& e);
@@ -54,13 +68,25 @@ class Replay {
   void forget_before(Time t);
   /// Becomes what `other` still knows that estimates of `t` and later need. Allocates only when it has never held so much.
   void copy_since(Time t, const Replay& other);
+  /// A closed estimate has been corrected: what was taken before was on another way.
+  void forget_taken() { taken_.clear(); }
   void clear_steps() {
     steps_.clear();
+    taken_.clear();
     remembered_.clear();
   }
 
  private:
-  static constexpr std::size_t most_remembered = 100;
+  static constexpr std::size_t most_remembered = 100, most_taken = 12;
+  // How a step was taken since the last close.
+  struct Taken {
+    Time t{};
+    LegModel::Used used;
+    Gain<LegModel::max_leg_rows> gain;
+  };
+
+  LegModel::Used apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept = nullptr) const;
+  bool retrace(Estimate& e, const Estimate& live, Time until, Trajectory* record) const;
   void say_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
   void say_clipped(ImuInterval& interval) const;
   void say_missed(ImuInterval& interval, double gap) const;
@@ -74,9 +100,11 @@ class Replay {
 
   EstimatorConfig config_;
   Told told_;
+  Time rest_until_ = Time::min();
   Recent<ImuSample> imu_;
   Recent<LegStep> steps_;
   std::vector<Estimate> remembered_;
+  std::vector<Taken> taken_;
   // Of the last seconds of the IMU.
   struct Usual {
     double period = 0;  // s, of samples that follow each other

@@ -134,9 +134,45 @@ TEST(Replay, AStepIsAppliedOnceHoweverOftenItsTimeIsReached) {
     Estimate before = advanced(replay, start(), t - milliseconds(1));
     replay.predict_to(before, t, nullptr);
     EXPECT_GT((before.P - once.P).norm(), 0) << "the step of that time is in it";
-    EXPECT_NE(replay.apply(before, leg_at(milliseconds(at_ms))), (std::array<bool, 2>{}));
+    EXPECT_NE(Replay(replay).take(before, leg_at(milliseconds(at_ms))), (std::array<bool, 2>{}));
     expect_same(before, once);
   }
+}
+
+// Legs as they come, with the newest IMU sample held, until the next one of these times, ms; then that comes. Closed as the estimator does
+// it, and gone again as a whole.
+struct BothWays {
+  Estimate closed, again, live;
+};
+BothWays both_ways(int from, int until) {
+  Replay replay = recorded(milliseconds(from));
+  BothWays out;
+  out.closed = out.live = advanced(replay, start(), begin_time + milliseconds(from));
+  for (int ms = from + 1; ms < until; ++ms) {
+    replay.predict_to(out.live, begin_time + milliseconds(ms), nullptr);
+    replay.take(out.live, leg_at(milliseconds(ms)));
+  }
+  replay.add(imu_at(milliseconds(until)));
+  out.again = advanced(replay, out.closed, begin_time + milliseconds(until));
+  replay.close(out.closed, out.live, begin_time + milliseconds(until), nullptr);
+  return out;
+}
+
+TEST(Replay, ClosedByTheGainsOfThenItIsAsIfAllHadBeenDoneAgain) {
+  for (const int from : {20, 95, 300}) {  // 100: the right foot comes down, 300: it has left
+    const BothWays way = both_ways(from, from + 5);
+    EXPECT_EQ(way.closed.t, way.again.t);
+    EXPECT_NE(way.closed.P, way.again.P) << "it was done again";
+    const double difference = boxminus(way.closed.x, way.again.x).norm(), closing = boxminus(way.live.x, way.again.x).norm();
+    EXPECT_LT(difference, 0.05 * closing) << from;
+    EXPECT_LT((way.closed.P - way.again.P).norm(), 1e-4 * way.again.P.norm());
+  }
+}
+
+TEST(Replay, ClosedOverAGapOfTheImuItIsDoneAgainWithTheNoiseOfTheGap) {
+  const BothWays way = both_ways(20, 31);
+  EXPECT_EQ(way.closed.P, way.again.P);
+  EXPECT_EQ(boxminus(way.closed.x, way.again.x), ErrorVector::Zero());
 }
 
 TEST(Replay, StepsBetweenTheSamplesTakeEffectAtTheirOwnTime) {
@@ -192,6 +228,37 @@ TEST(Replay, AcrossAGapOfTheImuTheCovarianceSaysThatNobodyLooked) {
   };
   EXPECT_GT(after_gap(milliseconds(40)), 20 * after_gap(milliseconds(20)));
   EXPECT_GT(after_gap(milliseconds(500)), after_gap(milliseconds(120)));
+}
+
+// A robot at rest, whose biases are the means of what an IMU with noise said: at the end of that time it has neither turned nor got under
+// way, whatever the noise was, and its covariance says so. From then on it grows.
+TEST(Replay, WhileTheBiasesWereTakenNoiseAddsNothing) {
+  test::Random random(5);
+  std::vector<ImuSample> samples;
+  Estimate e;
+  e.t = begin_time;
+  constexpr int n = 100;
+  for (int i = 0; i <= n; ++i) {
+    samples.push_back({begin_time + i * milliseconds(5), random.vector3(0.002), random.vector3(0.1) - e.x.g});
+    const double weight = (i == 0 || i == n ? 0.5 : 1.0) / n;  // as they are integrated
+    e.x.bg += weight * samples.back().gyro;
+    e.x.ba += weight * (samples.back().accel + e.x.g);
+  }
+  e.P.diagonal().setConstant(1e-10);
+  e.P.diagonal().segment<6>(at::bg).setConstant(1e-4);
+  for (std::size_t side = 0; side < 2; ++side) end_stance(e, side);
+  Replay replay{EstimatorConfig{}};
+  for (const ImuSample& s : samples) replay.add(s);
+  replay.began_at_rest(samples.back().t);
+  replay.predict_to(e, samples.back().t, nullptr);
+  EXPECT_LT(e.x.R.Log().norm(), 1e-4);
+  EXPECT_LT(e.x.v.norm(), 1e-3);
+  EXPECT_LT(e.P(at::R, at::R), 2e-10);
+  EXPECT_LT(e.P(at::v, at::v), 2e-8);
+  EXPECT_LT(std::abs(e.P(at::v, at::ba)), 1e-12);
+  replay.predict_to(e, samples.back().t + milliseconds(20), nullptr);
+  EXPECT_GT(e.P(at::R, at::R), 3e-8);
+  EXPECT_LT(e.P(at::v, at::ba), -1e-6);
 }
 
 TEST(Replay, StampsThatJitterAreNoMissedSamples) {

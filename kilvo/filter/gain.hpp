@@ -37,10 +37,18 @@ class Gain {
   /// The step from an iterate at prior [+] e.
   ErrorVector step(const Rows<Max>& rows, const ErrorVector& e) const;
 
+  /// The step from the prior, of rows that are these but for their residual.
+  ErrorVector step(const Residual<Max>& r) const {
+    return step(r, [](Eigen::Index) { return 0.0; });
+  }
+
   /// The covariance after the step.
   void reduce(const Covariance& P, Covariance& out) const;
 
  private:
+  template <class Known>
+  ErrorVector step(const Residual<Max>& r, Known&& known) const;
+
   Columns W_;
   Square S_;
   std::array<double, static_cast<std::size_t>(Max)> inverse_{};  // of the diagonal of L
@@ -74,10 +82,16 @@ bool Gain<Max>::factor() {
 
 template <int Max>
 ErrorVector Gain<Max>::step(const Rows<Max>& rows, const ErrorVector& e) const {
-  ErrorVector d = -e;
+  return step(rows.r, [&](Eigen::Index i) { return rows.H.row(i).dot(e); }) - e;
+}
+
+template <int Max>
+template <class Known>
+ErrorVector Gain<Max>::step(const Residual<Max>& r, Known&& known) const {
+  ErrorVector d = ErrorVector::Zero();
   std::array<double, static_cast<std::size_t>(Max)> y;
-  for (Eigen::Index i = 0; i < rows.r.size(); ++i) {
-    double v = rows.r[i] - rows.H.row(i).dot(e);
+  for (Eigen::Index i = 0; i < r.size(); ++i) {
+    double v = r[i] - known(i);
     for (Eigen::Index k = 0; k < i; ++k) v -= S_(i, k) * y[static_cast<std::size_t>(k)];
     v *= inverse_[static_cast<std::size_t>(i)];
     y[static_cast<std::size_t>(i)] = v;

@@ -76,14 +76,15 @@ void move(const Covariance& P, const MovingRows& F, Covariance& out) {
 
 void add_process_noise(Covariance& P, const Motion& m, const Eigen::Vector3d& up_W, const FootOrientations& feet, const ProcessNoise& n,
                        const ImuInterval& interval) {
-  const double dt = m.dt;
+  const double dt = m.dt, gyro_scale = interval.made_biases ? 0 : interval.gyro_scale,
+               accel_scale = interval.made_biases ? 0 : interval.accel_scale;
   const auto add = [&P](int row, int col, double value) { P.diagonal(col - row).segment<3>(std::min(row, col)).array() += value; };
-  const double accel = interval.accel_scale * n.accel * n.accel;
-  add(at::R, at::R, interval.gyro_scale * n.gyro * n.gyro * dt);
+  const double accel = accel_scale * n.accel * n.accel;
+  add(at::R, at::R, gyro_scale * n.gyro * n.gyro * dt);
   add(at::v, at::v, accel * dt);
   add(at::p, at::v, accel * dt * dt / 2);
   add(at::v, at::p, accel * dt * dt / 2);
-  add(at::p, at::p, accel * dt * dt * dt / 3 + interval.accel_scale * interval.velocity_scale * n.velocity * n.velocity * dt);
+  add(at::p, at::p, accel * dt * dt * dt / 3 + accel_scale * interval.velocity_scale * n.velocity * n.velocity * dt);
   add(at::bg, at::bg, n.gyro_bias * n.gyro_bias * dt);
   add(at::ba, at::ba, n.accel_bias * n.accel_bias * dt);
   for (int foot = 0; foot < 2; ++foot) {
@@ -140,6 +141,8 @@ Estimate predict(const Estimate& e, const ImuInterval& interval, const FootOrien
   F.block<3, 3>(at::v, at::bg) = 0.5 * dt * j.f1_bg;
   F.block<3, 3>(at::v, at::ba) = -0.5 * dt * (R0 + R1);
   F.block<3, 3>(at::v, at::g) = dt * I;
+  // By the end of the window that the biases are means of, their error has taken back what the noise of the samples did.
+  if (interval.made_biases) F.middleCols<at::pcl - at::bg>(at::bg).setZero();
   move(e.P, F, out.P);
   add_process_noise(out.P, m, -e.x.g.normalized(), feet, noise, interval);
   return out;

@@ -18,6 +18,7 @@ struct ImuInterval {
   Eigen::Vector3d accel_begin, accel_end;  // m/s^2
   double gyro_scale = 1, accel_scale = 1;  // multiply the variances of rate and of specific force (gaps)
   double velocity_scale = 1;               // multiplies that of ProcessNoise::velocity
+  bool made_biases = false;                // at rest, and the biases are the means of these very samples
 
   /// The latest sample, held.
   static ImuInterval hold(const ImuSample& s, Time begin, Time end) { return {begin, end, s.gyro, s.gyro, s.accel, s.accel}; }

@@ -45,16 +45,18 @@ inline Covariance seen_at_iterate(const Covariance& P, const Eigen::Vector3d& tu
 
 /// `model(iterate, prior covariance)` returns Information<N> (many rows) or Rows<N> (few rows) about the iterate. It may associate and
 /// gate anew at each iterate. `shared`: how the error of the prior's pose goes with noise of the pose that is common to all rows (and is
-/// in the model's R already), where what made the one made the other as well.
+/// in the model's R already), where what made the one made the other as well. `kept`: where the last step's gain is left.
 template <class Model>
-Update update(const Estimate& prior, Model&& model, const UpdateConfig& config, const PoseCovariance* shared = nullptr) {
+Update update(const Estimate& prior, Model&& model, const UpdateConfig& config, const PoseCovariance* shared = nullptr,
+              Gain<most_rows_of<Model>>* kept = nullptr) {
   Update out;
   out.posterior.t = prior.t;
   State x = prior.x;
   ErrorVector e = ErrorVector::Zero();  // x [-] prior.x; J^-1 e = e, since Jr(e_R) e_R = e_R
   Covariance seen;
   Eigen::Vector3d turned;
-  Gain<most_rows_of<Model>> gain;
+  Gain<most_rows_of<Model>> own;
+  Gain<most_rows_of<Model>>& gain = kept != nullptr ? *kept : own;
   for (int k = 1; k <= config.max_iterations; ++k) {
     const auto measured = model(static_cast<const State&>(x), prior.P);
     const auto& rows = as_rows(measured);
@@ -70,6 +72,13 @@ Update update(const Estimate& prior, Model&& model, const UpdateConfig& config, 
       const auto HC = (rows.H.template leftCols<6>() * C).eval();
       gain.S() += HC + HC.transpose();
       gain.W().template topRows<6>() += C;
+    }
+    if (rows.gyro2 > 0) {
+      // What the noise turned the prior by in the time that the rows speak of, and what it does to them as if it were in the bias.
+      const auto C = (-rows.gyro2 * rows.H.template middleCols<3>(at::bg).transpose()).eval();
+      const auto HC = (rows.H.template middleCols<3>(at::R) * C).eval();
+      gain.S() += HC + HC.transpose();
+      gain.W().template middleRows<3>(at::R) += C;
     }
     if (!gain.factor()) return {prior, k, false, 0};
     const ErrorVector d = gain.step(rows, e);

@@ -103,6 +103,7 @@ bool LegModel::add_motion(LegRows& rows, int count, std::size_t side, const Stat
   const double vertical2 = config_.vertical_velocity_sigma * config_.vertical_velocity_sigma;
   rows.R.block<3, 3>(count, count) = along * (vertical2 - velocity2) * up_W * up_W.transpose();
   rows.R.diagonal().segment<3>(count).array() += along * velocity2;
+  rows.R.block<3, 3>(count, count) += (gyro_noise_ * gyro_noise_ / dt) * v.J_bg * v.J_bg.transpose();
   rows.R.diagonal().segment<3>(count + 3).setConstant(foot.looseness * position2 * std::max(1.0, config_.position_correlation / dt));
   return true;
 }
@@ -124,20 +125,36 @@ bool LegModel::add_height(LegRows& rows, int count, std::size_t side, const Stat
 
 LegModel::LegRows LegModel::operator()(const State& x, const Covariance& prior) {
   LegRows rows;
+  rows.gyro2 = gyro_noise_ * gyro_noise_;
   rows.r.resize(max_leg_rows);
   rows.H.setZero(max_leg_rows, at::size);
   rows.R.setZero(max_leg_rows, max_leg_rows);
   int count = 0;
   for (std::size_t side = 0; side < 2; ++side) {
-    passed_[side] = step_.foot[side].used && add_motion(rows, count, side, x, prior);
-    if (!passed_[side]) continue;
-    count += 6;
-    if (add_height(rows, count, side, x, prior)) ++count;
+    used_.motion[side] = step_.foot[side].used && add_motion(rows, count, side, x, prior);
+    if (used_.motion[side]) count += 6;
+    used_.height[side] = used_.motion[side] && add_height(rows, count, side, x, prior);
+    if (used_.height[side]) ++count;
   }
   rows.r.conservativeResize(count);
   rows.H.conservativeResize(count, at::size);
   rows.R.conservativeResize(count, count);
   return rows;
+}
+
+Residual<LegModel::max_leg_rows> LegModel::residual(const LegStep& step, const State& x, const Eigen::Vector3d& gyro, const Used& used) {
+  Residual<max_leg_rows> r(max_leg_rows);
+  int count = 0;
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!used.motion[side]) continue;
+    const Stance& foot = step.foot[side];
+    r.segment<3>(count) = foot_velocity(x, foot.point, gyro).r;
+    r.segment<3>(count + 3) = foot_position(x, foot.point, x.pc[side]).r;
+    count += 6;
+    if (used.height[side]) r[count++] = foot_height(*foot.ground, x.pc[side]).r;
+  }
+  r.conservativeResize(count);
+  return r;
 }
 
 void begin_stance(Estimate& e, std::size_t side, const SolePoint& point, const LegConfig& config) {
@@ -158,6 +175,14 @@ void move_stance(Estimate& e, std::size_t side, const Eigen::Vector3d& shift) {
   e.x.pc[side] += e.x.R * shift;
   e.P.middleRows<3>(pc) += (J * e.P.middleRows<3>(at::R)).eval();
   e.P.middleCols<3>(pc) += (e.P.middleCols<3>(at::R) * J.transpose()).eval();
+}
+
+void place_stances(State& x, const LegStep& step) {
+  for (std::size_t side = 0; side < 2; ++side) {
+    const Stance& foot = step.foot[side];
+    if (foot.begins) x.pc[side] = x.pose() * foot.point.p;
+    if (foot.used && !foot.begins) x.pc[side] += x.R * foot.shift;
+  }
 }
 
 void end_stance(Estimate& e, std::size_t side) {

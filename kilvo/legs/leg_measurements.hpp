@@ -58,12 +58,20 @@ class LegModel {
  public:
   static constexpr int max_leg_rows = 14;
 
-  LegModel(const LegStep& step, const Eigen::Vector3d& gyro, const LegConfig& config) : step_(step), gyro_(gyro), config_(config) {}
+  /// `gyro_noise`: density of the gyro's noise that has turned the prior until now, rad/s/sqrt(Hz).
+  LegModel(const LegStep& step, const Eigen::Vector3d& gyro, const LegConfig& config, double gyro_noise = 0)
+      : step_(step), gyro_(gyro), config_(config), gyro_noise_(gyro_noise) {}
 
   Rows<max_leg_rows> operator()(const State& x, const Covariance& prior);
 
-  /// Of the last evaluation: which feet passed.
-  const std::array<bool, 2>& passed() const { return passed_; }
+  /// Of the last evaluation: which feet passed, and which of them came down on known ground.
+  struct Used {
+    std::array<bool, 2> motion = {false, false}, height = {false, false};
+  };
+  const Used& used() const { return used_; }
+
+  /// The residual alone, of the rows that were used.
+  static Residual<max_leg_rows> residual(const LegStep& step, const State& x, const Eigen::Vector3d& gyro, const Used& used);
 
  private:
   using LegRows = Rows<max_leg_rows>;
@@ -74,13 +82,16 @@ class LegModel {
   const LegStep& step_;
   Eigen::Vector3d gyro_;
   const LegConfig& config_;
-  std::array<bool, 2> passed_ = {false, false};
+  double gyro_noise_;
+  Used used_;
 };
 
 /// Puts the contact position of a foot into the state: mean, covariance and cross-covariance from the pose and the kinematics.
 void begin_stance(Estimate& e, std::size_t side, const SolePoint& point, const LegConfig& config);
 /// Moves it along the sole, by `shift` in the IMU frame: mean and covariance.
 void move_stance(Estimate& e, std::size_t side, const Eigen::Vector3d& shift);
+/// Both of these on the mean alone.
+void place_stances(State& x, const LegStep& step);
 /// Takes it out: its rows and columns become zero.
 void end_stance(Estimate& e, std::size_t side);
 

@@ -110,7 +110,7 @@ TEST(LegMeasurements, TheModelHoldsTwelveRowsForTwoFeetAndEachFootHasItsOwnColum
   LegModel model(step, gyro, config);
   const Rows<LegModel::max_leg_rows> both = model(e.x, e.P);
   ASSERT_EQ(both.r.size(), 12);
-  EXPECT_TRUE(model.passed()[0] && model.passed()[1]);
+  EXPECT_TRUE(model.used().motion[0] && model.used().motion[1]);
   const Eigen::Matrix3d minus = -Eigen::Matrix3d::Identity();
   EXPECT_EQ(Eigen::Matrix3d(both.H.block<3, 3>(3, at::pcl)), minus);
   EXPECT_EQ(Eigen::Matrix3d(both.H.block<3, 3>(9, at::pcr)), minus);
@@ -134,8 +134,8 @@ TEST(LegMeasurements, AFootThatIsFarFasterThanTheStateAllowsIsLeftOutAndTheOther
   LegModel model(step, Eigen::Vector3d::Zero(), config);
   const Rows<LegModel::max_leg_rows> rows = model(e.x, e.P);
   ASSERT_EQ(rows.r.size(), 6);
-  EXPECT_FALSE(model.passed()[0]);
-  EXPECT_TRUE(model.passed()[1]);
+  EXPECT_FALSE(model.used().motion[0]);
+  EXPECT_TRUE(model.used().motion[1]);
   EXPECT_TRUE((rows.H.middleCols<3>(at::pcl).isZero(0))) << "nothing of the foot that was left out";
   EXPECT_EQ(Eigen::Matrix3d(rows.H.block<3, 3>(3, at::pcr)), Eigen::Matrix3d(-Eigen::Matrix3d::Identity()));
   e.P.diagonal().segment<3>(at::v).setConstant(4);
@@ -151,10 +151,10 @@ TEST(LegMeasurements, TheGateDoesNotOpenForAFootThatIsLooseBecauseItMoves) {
   step.foot[0].looseness = 100;
   step.foot[0].point.v = {0.25, 0, 0};
   model(e.x, e.P);
-  EXPECT_EQ(model.passed(), (std::array<bool, 2>{false, true}));
+  EXPECT_EQ(model.used().motion, (std::array<bool, 2>{false, true}));
   step.foot[0].point.v = {0.1, 0, 0};
   model(e.x, e.P);
-  EXPECT_EQ(model.passed(), (std::array<bool, 2>{true, true})) << "soles settle and roll";
+  EXPECT_EQ(model.used().motion, (std::array<bool, 2>{true, true})) << "soles settle and roll";
 }
 
 TEST(LegMeasurements, TheGateClosesForAFootThatIsNotWhereItStood) {
@@ -166,10 +166,10 @@ TEST(LegMeasurements, TheGateClosesForAFootThatIsNotWhereItStood) {
   LegModel model(step, Eigen::Vector3d::Zero(), config);
   e.x.pc[1] = {0, 0.03, 0};
   model(e.x, e.P);
-  EXPECT_EQ(model.passed(), (std::array<bool, 2>{true, false}));
+  EXPECT_EQ(model.used().motion, (std::array<bool, 2>{true, false}));
   e.P.diagonal().segment<3>(at::pcr).setConstant(1e-4);
   model(e.x, e.P);
-  EXPECT_EQ(model.passed(), (std::array<bool, 2>{true, true})) << "after a while it may have moved so far";
+  EXPECT_EQ(model.used().motion, (std::array<bool, 2>{true, true})) << "after a while it may have moved so far";
 }
 
 TEST(LegMeasurements, TheJacobianOfTheHeightIsWhatCentralDifferencesSay) {

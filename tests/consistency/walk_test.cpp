@@ -49,15 +49,14 @@ struct LegDensity {
 LegDensity leg_density(const lab::SimulatorConfig& config) {
   const lab::BipedShape& shape = config.shape;
   const double ankle = shape.sole_depth, knee = ankle + shape.shin, hip = knee + shape.thigh;
-  // Hip, knee and ankle turn about one axis each way. The vertical only has the way from under them to where the sole stands, half a step.
-  const double lever = std::hypot(hip, knee, ankle), vertical_lever = 0.2;
-  const double imu_height = hip - shape.hip.z() + shape.T_torso_imu().p.z();
+  // Forward hip, knee and ankle turn; sideways hip and ankle do, and by next to nothing while it walks. The vertical only has the way from
+  // under them to where the sole stands, half a step.
+  const double forward = std::hypot(hip, knee, ankle), sideways = std::hypot(hip, ankle), vertical = 0.2;
   constexpr double stance = 0.55, knee_rate = 1.5;  // s, rad/s: what is wrong with a joint's zero is so for a stance
-  const auto of_joints = [&](double l) {
-    return square(l * config.joints.velocity_noise) / config.joints.delivery.rate +
-           square(l * config.joints.offset_sigma * knee_rate) * stance;
-  };
-  return {of_joints(lever) + square(imu_height * config.imu.gyro_noise), of_joints(vertical_lever)};
+  const auto of_rates = [&](double l) { return square(l * config.joints.velocity_noise) / config.joints.delivery.rate; };
+  const auto of_zeros = [&](double l) { return square(l * config.joints.offset_sigma * knee_rate) * stance; };
+  // The settings know one density across: the mean of both ways, since the robot turns. The gyro's part is the filter's own.
+  return {0.5 * (of_rates(forward) + of_zeros(forward) + of_rates(sideways)), of_rates(vertical) + of_zeros(vertical)};
 }
 
 /// One simulated walk, estimated by some of its sensors.
