@@ -277,10 +277,11 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
     if (foot.begins && map != nullptr) foot.ground = ground_under(*map, x.pose() * foot.point.p, -x.g.normalized(), ground);
     // Eq. 8: what moves is believed less; so is what has just arrived.
     const double moving2 = velocity_W(x, foot.point.p, foot.point.v, omega).squaredNorm();
+    const double noise2 = config_.velocity_sigma * config_.velocity_sigma + sigma_v * sigma_v;
     const double entering = std::max(0.0, 1.0 - (phase - config_.entry_delay) / entry_time);
-    foot.looseness =
-        std::clamp(1.0 + moving2 / (config_.velocity_sigma * config_.velocity_sigma + sigma_v * sigma_v) + (loosest - 1) * entering, 1.0,
-                   loosest * loosest);
+    // Three axes of noise alone are no motion.
+    const double loose = 1.0 + std::max(0.0, moving2 / noise2 - 3.0) + (loosest - 1) * entering;
+    foot.looseness = std::min(loose, loosest * loosest);
   }
   return out;
 }

@@ -49,14 +49,16 @@ struct LegDensity {
 LegDensity leg_density(const lab::SimulatorConfig& config) {
   const lab::BipedShape& shape = config.shape;
   const double ankle = shape.sole_depth, knee = ankle + shape.shin, hip = knee + shape.thigh;
-  // Forward hip, knee and ankle turn; sideways hip and ankle do, and by next to nothing while it walks. The vertical only has the way from
-  // under them to where the sole stands, half a step.
+  // Forward hip, knee and ankle turn, sideways hip and ankle. The vertical only has the way from under them to where the sole stands, half
+  // a step.
   const double forward = std::hypot(hip, knee, ankle), sideways = std::hypot(hip, ankle), vertical = 0.2;
-  constexpr double stance = 0.55, knee_rate = 1.5;  // s, rad/s: what is wrong with a joint's zero is so for a stance
-  const auto of_rates = [&](double l) { return square(l * config.joints.velocity_noise) / config.joints.delivery.rate; };
-  const auto of_zeros = [&](double l) { return square(l * config.joints.offset_sigma * knee_rate) * stance; };
+  const auto of_rates = [&](double lever) { return square(lever * config.joints.velocity_noise) / config.joints.delivery.rate; };
+  // What is wrong with a joint's zero turns the way that the foot goes under the body, for a stance: the hip's yaw to the side, the pitch
+  // of hip and, by its part of the leg, knee up and down.
+  constexpr double stance = 0.55, speed = 0.5;  // s, m/s
+  const double of_zero = square(speed * config.joints.offset_sigma) * stance;
   // The settings know one density across: the mean of both ways, since the robot turns. The gyro's part is the filter's own.
-  return {0.5 * (of_rates(forward) + of_zeros(forward) + of_rates(sideways)), of_rates(vertical) + of_zeros(vertical)};
+  return {0.5 * (of_rates(forward) + of_rates(sideways) + of_zero), of_rates(vertical) + of_zero * (1 + square(knee / hip))};
 }
 
 /// One simulated walk, estimated by some of its sensors.
@@ -90,8 +92,8 @@ class Walk {
   Samples estimated_by_rigid_legs() const {
     EstimatorConfig config = settings_.estimator;
     const LegDensity density = leg_density(simulator_->config());
-    config.legs.velocity_sigma = 0.01;  // the density below is of any; Eq. 8 loosens feet that move faster than it
-    config.legs.velocity_correlation = density.across / square(config.legs.velocity_sigma);
+    config.legs.velocity_correlation = 1 / simulator_->config().joints.delivery.rate;  // white
+    config.legs.velocity_sigma = std::sqrt(density.across / config.legs.velocity_correlation);
     config.legs.vertical_velocity_sigma = std::sqrt(density.vertical / config.legs.velocity_correlation);
     // Where a foot is tells once more how fast it has been.
     config.legs.position_sigma = 0.001;
