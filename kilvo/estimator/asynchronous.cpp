@@ -32,7 +32,6 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
     estimate_ = closed_;  // should all of it wait, or be dropped
     process_pending(s.t, out);
     closed_ = *estimate_;
-    replay_.forget_taken();
   }
   Stopwatch watch;
   replay_.remember(closed_);

@@ -29,11 +29,11 @@ struct Replay {
 
 // `edit` may change a measurement or, by returning false, keep it away.
 Replay run(const lab::AnalyticRoomConfig& room_config, const std::function<bool(Measurement&)>& edit = {}, int threads = 1,
-           std::array<bool, sensor_count> used = imu_and_lidar) {
+           std::array<bool, sensor_count> used = imu_and_lidar, const EstimatorConfig& start_from = {}) {
   lab::AnalyticRoom room(room_config);
   Robot robot;
   robot.lidar.T_imu_lidar = room_config.T_imu_lidar;
-  EstimatorConfig config;
+  EstimatorConfig config = start_from;
   config.threads = threads;
   Estimator estimator(robot, config, used);
   Replay out;
@@ -90,6 +90,15 @@ std::function<bool(Measurement&)> without(Sensor sensor, double from, double to)
     const double s = to_seconds(stamp_of(m) - *first);
     return sensor_of(m) != sensor || s < from || s >= to;
   };
+}
+
+TEST(Estimator, BegunOnTheMoveTheSweepsHoldIt) {
+  EstimatorConfig config;
+  config.initial.still_gyro = 1e-9;  // it never stands still
+  const Replay r = run(small_room(), {}, 1, imu_and_lidar, config);
+  expect_sane(r);
+  EXPECT_LT(r.worst_position, 0.03);
+  EXPECT_GE(r.statistics.sensors[static_cast<std::size_t>(Sensor::lidar)].used, 40u);
 }
 
 TEST(Estimator, FollowsARoomWithinMillimetresAtImuRate) {

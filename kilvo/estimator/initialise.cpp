@@ -99,7 +99,7 @@ Start Initialiser::start(bool still) const {
   const Eigen::Vector3d up_I = accel.norm() > 1e-6 ? Eigen::Vector3d(accel.normalized()) : Eigen::Vector3d::UnitZ();
 
   Estimate& e = out.estimate;
-  out.rest_until = window_.back().t;
+  if (still) out.rest_until = window_.back().t;
   e.t = still ? window_.front().t : window_.back().t;
   if (gravity_align_) e.x.R = level(up_I);
   const Eigen::Vector3d up_W = e.x.R * up_I;

@@ -12,9 +12,9 @@
 namespace kilvo {
 
 struct Start {
-  Estimate estimate;       // at the first sample of the still window, or at the last sample of a moving start
-  Time rest_until{};       // the last sample of the still window
-  double accel_scale = 1;  // from the IMU's unit to m/s^2
+  Estimate estimate;               // at the first sample of the still window, or at the last sample of a moving start
+  std::optional<Time> rest_until;  // the last sample of the still window
+  double accel_scale = 1;          // from the IMU's unit to m/s^2
   bool still = true;
   double resting_norm = 0;  // of the accelerometer, in its own unit
 };

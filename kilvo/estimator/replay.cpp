@@ -119,11 +119,12 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   if (imu_.empty()) return;
   const FootOrientations feet = standing_at(e.t);
   const auto step = [&](ImuInterval interval) {
+    // What was missed or clipped is in no mean.
+    interval.made_biases = is_of_rest(interval.end) && interval.gyro_scale == 1 && interval.accel_scale == 1;
     if (interval.begin < told_.until) {
       interval.gyro_scale *= 1 - told_.rotation;
       interval.velocity_scale *= 1 - told_.position;
     }
-    interval.made_biases = interval.end <= rest_until_;
     e = predict(e, interval, feet, config_.noise);
     if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
   };
@@ -139,7 +140,9 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   if (e.t >= until) return;
   ImuSample held = imu_.back();
   held.t = until;
-  step(interval_between(imu_.back(), held, e.t, until, e.x));
+  // Within a period it is held; a copy of itself is no sample that says the same twice.
+  const bool is_gap = to_seconds(until - imu_.back().t) > config_.max_imu_gap;
+  step(is_gap ? interval_between(imu_.back(), held, e.t, until, e.x) : ImuInterval::hold(held, e.t, until));
 }
 
 std::optional<Eigen::Vector3d> Replay::gyro_at(Time t) const {
@@ -167,11 +170,13 @@ LegModel::Used Replay::apply(Estimate& e, const LegStep& step, Gain<LegModel::ma
   // Without a rate the velocity of a foot that is a leg away from the IMU is anything.
   const auto gyro = gyro_at(step.t);
   if (!gyro) return {{step.foot[0].used, step.foot[1].used}, {}};
-  LegModel model(step, *gyro, config_.legs, step.t > rest_until_ ? config_.noise.gyro : 0);
+  LegModel model(step, *gyro, config_.legs);
   // The rows are nearly linear: one iteration.
   UpdateConfig once;
   once.max_iterations = 1;
-  e = update(e, model, once, nullptr, kept).posterior;
+  Update done = update(e, model, once, nullptr, kept);
+  e = done.posterior;
+  if (done.rows == 0 && kept != nullptr) *kept = {};
   return model.used();
 }
 
@@ -184,12 +189,13 @@ std::array<bool, 2> Replay::take(Estimate& e, const LegStep& step) {
 }
 
 bool Replay::retrace(Estimate& e, const Estimate& live, Time until, Trajectory* record) const {
-  if (imu_.size() < 2 || imu_.back().t != until || steps_.empty() || live.t != steps_.back().t) return false;
+  if (imu_.size() < 2 || imu_.back().t != until || steps_.empty() || live.t != steps_.back().t || live.t > until) return false;
   const ImuSample &a = imu_[imu_.size() - 2], &b = imu_.back();
   auto step = std::upper_bound(steps_.begin(), steps_.end(), e.t, [](Time t, const LegStep& s) { return t < s.t; });
-  const auto same_time = [](const Taken& taken, const LegStep& s) { return taken.t == s.t; };
+  // No gain was made without a rate, or when it had no solution.
+  const auto is_of = [](const Taken& k, const LegStep& s) { return k.t == s.t && k.gain.rows() == k.used.rows(); };
   const auto taken = std::find_if(taken_.begin(), taken_.end(), [&e](const Taken& k) { return k.t > e.t; });
-  if (a.t > e.t || !std::equal(taken, taken_.end(), step, steps_.end(), same_time)) return false;
+  if (a.t > e.t || !std::equal(taken, taken_.end(), step, steps_.end(), is_of)) return false;
   // What is only known now that the second sample has come: a gap, a jump, the end of its range.
   const ImuInterval whole = interval_between(a, b, e.t, until, e.x);
   if (whole.gyro_scale != 1 || whole.accel_scale != 1) return false;
@@ -254,6 +260,7 @@ const Estimate& Replay::nearest(Time t, const Estimate& oldest) const {
 
 void Replay::forget_before(Time t) {
   remembered_.clear();
+  taken_.clear();
   while (imu_.size() > 2 && imu_[1].t <= t) imu_.pop_front();
   while (steps_.size() > 1 && steps_[1].t <= t) steps_.pop_front();
 }

@@ -54,10 +54,10 @@ class Replay {
   /// of what the IMU will get wrong in rotation and in position until then.
   void sweep_told(Time end, double rotation, double position) { told_ = {end, rotation, position}; }
 
-  /// The robot stood still until `end`, and the first biases are the means of what the IMU said until then.
-  void began_at_rest(Time end) { rest_until_ = end; }
+  /// The robot stood still until `end`, if it did, and the first biases are the means of what the IMU said until then.
+  void began_at_rest(std::optional<Time> end) { rest_until_ = end; }
   /// How much of the last `span` before `t` was after that.
-  Duration since_rest(Time t, Duration span) const { return t <= rest_until_ ? Duration(0) : std::min(span, t - rest_until_); }
+  Duration since_rest(Time t, Duration span) const { return is_of_rest(t - span) ? std::max(Duration(0), t - *rest_until_) : span; }
 
   /// `e` came from the oldest estimate that will be replayed by advance(): a way to a later time may begin there instead.
   void remember(const Estimate& e);
@@ -68,8 +68,6 @@ class Replay {
   void forget_before(Time t);
   /// Becomes what `other` still knows that estimates of `t` and later need. Allocates only when it has never held so much.
   void copy_since(Time t, const Replay& other);
-  /// A closed estimate has been corrected: what was taken before was on another way.
-  void forget_taken() { taken_.clear(); }
   void clear_steps() {
     steps_.clear();
     taken_.clear();
@@ -85,6 +83,7 @@ class Replay {
     Gain<LegModel::max_leg_rows> gain;
   };
 
+  bool is_of_rest(Time end) const { return rest_until_ && end <= *rest_until_; }
   LegModel::Used apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept = nullptr) const;
   bool retrace(Estimate& e, const Estimate& live, Time until, Trajectory* record) const;
   void say_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
@@ -100,7 +99,7 @@ class Replay {
 
   EstimatorConfig config_;
   Told told_;
-  Time rest_until_ = Time::min();
+  std::optional<Time> rest_until_;
   Recent<ImuSample> imu_;
   Recent<LegStep> steps_;
   std::vector<Estimate> remembered_;

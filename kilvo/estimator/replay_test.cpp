@@ -113,6 +113,19 @@ TEST(Replay, BetweenTwoSamplesBothAreUsedAndAfterTheNewestItIsHeld) {
   expect_same(advanced(replay, advanced(replay, start(), middle), later), expected);
 }
 
+TEST(Replay, AHeldSampleOfAnImpactIsNotTakenForTheEndOfTheRange) {
+  Replay replay{EstimatorConfig{}};
+  replay.add(imu_at(milliseconds(0)));
+  ImuSample impact = imu_at(milliseconds(5));
+  impact.accel.z() = 60;
+  replay.add(impact);
+  Estimate e = start();
+  replay.predict_to(e, begin_time + milliseconds(5), nullptr);
+  const Covariance before = e.P;
+  replay.predict_to(e, begin_time + milliseconds(9), nullptr);
+  EXPECT_LT(e.P(at::R, at::R), before(at::R, at::R) + 1e-5) << "3 rad/s of doubt would be 4e-4";
+}
+
 TEST(Replay, AnIntervalThatIsClosedLaterIsAsIfBothEndsHadBeenKnown) {
   EstimatorConfig config;
   Replay replay(config);
@@ -144,11 +157,11 @@ TEST(Replay, AStepIsAppliedOnceHoweverOftenItsTimeIsReached) {
 struct BothWays {
   Estimate closed, again, live;
 };
-BothWays both_ways(int from, int until) {
+BothWays both_ways(int from, int until, int legs_until) {
   Replay replay = recorded(milliseconds(from));
   BothWays out;
   out.closed = out.live = advanced(replay, start(), begin_time + milliseconds(from));
-  for (int ms = from + 1; ms < until; ++ms) {
+  for (int ms = from + 1; ms < legs_until; ++ms) {
     replay.predict_to(out.live, begin_time + milliseconds(ms), nullptr);
     replay.take(out.live, leg_at(milliseconds(ms)));
   }
@@ -160,7 +173,7 @@ BothWays both_ways(int from, int until) {
 
 TEST(Replay, ClosedByTheGainsOfThenItIsAsIfAllHadBeenDoneAgain) {
   for (const int from : {20, 95, 300}) {  // 100: the right foot comes down, 300: it has left
-    const BothWays way = both_ways(from, from + 5);
+    const BothWays way = both_ways(from, from + 5, from + 5);
     EXPECT_EQ(way.closed.t, way.again.t);
     EXPECT_NE(way.closed.P, way.again.P) << "it was done again";
     const double difference = boxminus(way.closed.x, way.again.x).norm(), closing = boxminus(way.live.x, way.again.x).norm();
@@ -170,9 +183,24 @@ TEST(Replay, ClosedByTheGainsOfThenItIsAsIfAllHadBeenDoneAgain) {
 }
 
 TEST(Replay, ClosedOverAGapOfTheImuItIsDoneAgainWithTheNoiseOfTheGap) {
-  const BothWays way = both_ways(20, 31);
+  const BothWays way = both_ways(20, 31, 31);
   EXPECT_EQ(way.closed.P, way.again.P);
   EXPECT_EQ(boxminus(way.closed.x, way.again.x), ErrorVector::Zero());
+}
+
+TEST(Replay, ClosedWhileTheLegsAreAheadItEndsAtTheSample) {
+  const BothWays way = both_ways(20, 25, 28);
+  EXPECT_EQ(way.closed.t, begin_time + milliseconds(25));
+  EXPECT_EQ(way.closed.P, way.again.P);
+}
+
+TEST(Replay, OnlyWhatCameAfterTheRestCounts) {
+  Replay replay{EstimatorConfig{}};
+  EXPECT_EQ(replay.since_rest(begin_time, milliseconds(50)), milliseconds(50)) << "begun on the move";
+  replay.began_at_rest(begin_time);
+  EXPECT_EQ(replay.since_rest(begin_time - milliseconds(10), milliseconds(50)), milliseconds(0));
+  EXPECT_EQ(replay.since_rest(begin_time + milliseconds(20), milliseconds(50)), milliseconds(20));
+  EXPECT_EQ(replay.since_rest(begin_time + milliseconds(80), milliseconds(50)), milliseconds(50));
 }
 
 TEST(Replay, StepsBetweenTheSamplesTakeEffectAtTheirOwnTime) {

@@ -28,6 +28,7 @@ class Gain {
 
   /// W = P H' and S, of which only the lower triangle.
   void project(const Covariance& P, const Rows<Max>& rows);
+  Eigen::Index rows() const { return W_.cols(); }
   Columns& W() { return W_; }
   Square& S() { return S_; }
 

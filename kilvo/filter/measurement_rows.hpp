@@ -23,7 +23,6 @@ struct Rows {
   Residual<Max> r;
   Eigen::Matrix<double, Eigen::Dynamic, at::size, Eigen::RowMajor, Max, at::size> H;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, Max, Max> R;
-  double gyro2 = 0;  // density of the gyro's noise, when the rate that is in the rows has just turned the prior: (rad/s)^2/Hz
 };
 
 /// Many rows, summed: A = sum H' R^-1 H, b = sum H' R^-1 r over the `N` columns of the error state that they touch.

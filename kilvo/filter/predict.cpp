@@ -141,7 +141,8 @@ Estimate predict(const Estimate& e, const ImuInterval& interval, const FootOrien
   F.block<3, 3>(at::v, at::bg) = 0.5 * dt * j.f1_bg;
   F.block<3, 3>(at::v, at::ba) = -0.5 * dt * (R0 + R1);
   F.block<3, 3>(at::v, at::g) = dt * I;
-  // By the end of the window that the biases are means of, their error has taken back what the noise of the samples did.
+  // By the end of the window that the biases are means of, their error has taken back what the noise of the samples did; of gravity and
+  // the accelerometer's bias the mean holds the sum.
   if (interval.made_biases) F.middleCols<at::pcl - at::bg>(at::bg).setZero();
   move(e.P, F, out.P);
   add_process_noise(out.P, m, -e.x.g.normalized(), feet, noise, interval);

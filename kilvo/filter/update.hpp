@@ -73,13 +73,6 @@ Update update(const Estimate& prior, Model&& model, const UpdateConfig& config, 
       gain.S() += HC + HC.transpose();
       gain.W().template topRows<6>() += C;
     }
-    if (rows.gyro2 > 0) {
-      // What the noise turned the prior by in the time that the rows speak of, and what it does to them as if it were in the bias.
-      const auto C = (-rows.gyro2 * rows.H.template middleCols<3>(at::bg).transpose()).eval();
-      const auto HC = (rows.H.template middleCols<3>(at::R) * C).eval();
-      gain.S() += HC + HC.transpose();
-      gain.W().template middleRows<3>(at::R) += C;
-    }
     if (!gain.factor()) return {prior, k, false, 0};
     const ErrorVector d = gain.step(rows, e);
 

@@ -131,40 +131,6 @@ TEST(Update, NoiseThatGoesWithThePriorsErrorIsAsIfItWereAState) {
   }
 }
 
-// The noise of the rate turned the prior and is in the rows, which see it as if it were in the bias: against the textbook with that noise
-// as three more states.
-TEST(Update, NoiseOfTheGyroInPriorAndRowsIsAsIfItWereAState) {
-  test::Random random(8);
-  constexpr int N = at::size + 3;
-  for (int trial = 0; trial < 20; ++trial) {
-    constexpr double gyro2 = 0.01, dt = 0.1;
-    const Estimate before = random_prior(random, 0.1);
-    Estimate prior = before;
-    prior.P.diagonal().segment<3>(at::R).array() += gyro2 * dt;  // truth = estimate [+] error: less what the noise added to the rate
-    Matrix P = Matrix::Zero(N, N);
-    P.topLeftCorner<at::size, at::size>() = prior.P;
-    P.bottomRightCorner<3, 3>().diagonal().setConstant(gyro2 / dt);
-    for (int i = 0; i < 3; ++i) P(at::R + i, at::size + i) = P(at::size + i, at::R + i) = -gyro2;
-    LinearModel<12> model = random_model(random, prior.x, 6, 0, at::ba);
-    const Matrix H_bg = model.H.middleCols<3>(at::bg);
-    Matrix H(6, N);
-    H << model.H, H_bg;  // r(x) = 0 at the truth, when the rate is less its noise
-    const Matrix gain = P * H.transpose() * (H * P * H.transpose() + model.R).inverse();
-    const Matrix expected = (Matrix::Identity(N, N) - gain * H) * P;
-    const ErrorVector step = -(gain * model.offset).head<at::size>();
-
-    model.R += (gyro2 / dt) * H_bg * H_bg.transpose();
-    const auto rows = [&](const State& x, const Covariance& prior_P) {
-      Rows<12> out = model(x, prior_P);
-      out.gyro2 = gyro2;
-      return out;
-    };
-    const Update u = update(prior, rows, UpdateConfig{1, 0, 0});
-    EXPECT_LT((u.posterior.P - expected.topLeftCorner<at::size, at::size>()).norm(), 1e-9);
-    EXPECT_LT(boxminus(u.posterior.x, boxplus(prior.x, step)).norm(), 1e-9);
-  }
-}
-
 TEST(Update, InformationInUnitsFarApartLosesNothing) {
   test::Random random(4);
   Estimate prior = random_prior(random, 0.01);

@@ -103,7 +103,6 @@ bool LegModel::add_motion(LegRows& rows, int count, std::size_t side, const Stat
   const double vertical2 = config_.vertical_velocity_sigma * config_.vertical_velocity_sigma;
   rows.R.block<3, 3>(count, count) = along * (vertical2 - velocity2) * up_W * up_W.transpose();
   rows.R.diagonal().segment<3>(count).array() += along * velocity2;
-  rows.R.block<3, 3>(count, count) += (gyro_noise_ * gyro_noise_ / dt) * v.J_bg * v.J_bg.transpose();
   rows.R.diagonal().segment<3>(count + 3).setConstant(foot.looseness * position2 * std::max(1.0, config_.position_correlation / dt));
   return true;
 }
@@ -125,7 +124,6 @@ bool LegModel::add_height(LegRows& rows, int count, std::size_t side, const Stat
 
 LegModel::LegRows LegModel::operator()(const State& x, const Covariance& prior) {
   LegRows rows;
-  rows.gyro2 = gyro_noise_ * gyro_noise_;
   rows.r.resize(max_leg_rows);
   rows.H.setZero(max_leg_rows, at::size);
   rows.R.setZero(max_leg_rows, max_leg_rows);
@@ -279,7 +277,7 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
     const double moving2 = velocity_W(x, foot.point.p, foot.point.v, omega).squaredNorm();
     const double noise2 = config_.velocity_sigma * config_.velocity_sigma + sigma_v * sigma_v;
     const double entering = std::max(0.0, 1.0 - (phase - config_.entry_delay) / entry_time);
-    // Three axes of noise alone are no motion.
+    // As much as the noise across on all three axes is no motion.
     const double loose = 1.0 + std::max(0.0, moving2 / noise2 - 3.0) + (loosest - 1) * entering;
     foot.looseness = std::min(loose, loosest * loosest);
   }

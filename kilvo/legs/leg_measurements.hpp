@@ -58,15 +58,14 @@ class LegModel {
  public:
   static constexpr int max_leg_rows = 14;
 
-  /// `gyro_noise`: density of the gyro's noise that has turned the prior until now, rad/s/sqrt(Hz).
-  LegModel(const LegStep& step, const Eigen::Vector3d& gyro, const LegConfig& config, double gyro_noise = 0)
-      : step_(step), gyro_(gyro), config_(config), gyro_noise_(gyro_noise) {}
+  LegModel(const LegStep& step, const Eigen::Vector3d& gyro, const LegConfig& config) : step_(step), gyro_(gyro), config_(config) {}
 
   Rows<max_leg_rows> operator()(const State& x, const Covariance& prior);
 
   /// Of the last evaluation: which feet passed, and which of them came down on known ground.
   struct Used {
     std::array<bool, 2> motion = {false, false}, height = {false, false};
+    int rows() const { return 6 * (motion[0] + motion[1]) + height[0] + height[1]; }
   };
   const Used& used() const { return used_; }
 
@@ -82,7 +81,6 @@ class LegModel {
   const LegStep& step_;
   Eigen::Vector3d gyro_;
   const LegConfig& config_;
-  double gyro_noise_;
   Used used_;
 };
 
