@@ -97,7 +97,7 @@ TEST(Estimator, BegunOnTheMoveTheSweepsHoldIt) {
   config.initial.still_gyro = 1e-9;  // it never stands still
   const Replay r = run(small_room(), {}, 1, imu_and_lidar, config);
   expect_sane(r);
-  EXPECT_LT(r.worst_position, 0.03);
+  EXPECT_LT(r.worst_position, 0.15) << "the first of them has to find the velocity: without them it is metres";
   EXPECT_GE(r.statistics.sensors[static_cast<std::size_t>(Sensor::lidar)].used, 40u);
 }
 

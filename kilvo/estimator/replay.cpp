@@ -198,7 +198,7 @@ bool Replay::retrace(Estimate& e, const Estimate& live, Time until, Trajectory* 
   if (a.t > e.t || !std::equal(taken, taken_.end(), step, steps_.end(), is_of)) return false;
   // What is only known now that the second sample has come: a gap, a jump, the end of its range.
   const ImuInterval whole = interval_between(a, b, e.t, until, e.x);
-  if (whole.gyro_scale != 1 || whole.accel_scale != 1) return false;
+  if (to_seconds(b.t - a.t) > config_.max_imu_gap || whole.gyro_scale != 1 || whole.accel_scale != 1) return false;
   for (auto k = taken; k != taken_.end(); ++k, ++step) {
     const ImuInterval interval = ImuInterval::between(a, b, e.t, step->t);
     e.x = predict_mean(e.x, interval);
