@@ -57,8 +57,11 @@ LegDensity leg_density(const lab::SimulatorConfig& config) {
   // of hip and, by its part of the leg, knee up and down.
   constexpr double stance = 0.55, speed = 0.5;  // s, m/s
   const double of_zero = square(speed * config.joints.offset_sigma) * stance;
-  // The settings know one density across: the mean of both ways, since the robot turns. The gyro's part is the filter's own.
-  return {0.5 * (of_rates(forward) + of_rates(sideways) + of_zero), of_rates(vertical) + of_zero * (1 + square(knee / hip))};
+  // What the gyro says wrong turns the IMU about the sole. The settings know one density across: the mean of both ways, since the robot
+  // turns.
+  const double imu_height = hip - shape.hip.z() + shape.T_torso_imu().p.z();
+  return {0.5 * (of_rates(forward) + of_rates(sideways) + of_zero) + square(imu_height * config.imu.gyro_noise),
+          of_rates(vertical) + of_zero * (1 + square(knee / hip))};
 }
 
 /// One simulated walk, estimated by some of its sensors.
