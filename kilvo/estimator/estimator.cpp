@@ -185,7 +185,8 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   accel_scale_ = start.accel_scale;
   estimate_ = anchor_ = closed_ = start.estimate;
   last_sweep_ = start.estimate.t;
-  replay_.began_at_rest(start.rest_until);
+  // Sweeps see for themselves how a robot settles while it stands.
+  if (!uses(Sensor::lidar)) replay_.began_at_rest(start.rest_until);
   if (uses(Sensor::legs)) last_legs_ = start.estimate.t;  // taken as there until they stay silent
   trajectory_.push(estimate_->t, estimate_->x.pose(), estimate_->x.v);
   // On the move the first sweeps find the velocity; patches kept before that would be kept at wrong places.

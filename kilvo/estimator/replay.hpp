@@ -2,7 +2,6 @@
 // or again after a sweep has corrected its beginning.
 #pragma once
 
-#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -56,8 +55,6 @@ class Replay {
 
   /// The robot stood still until `end`, if it did, and the first biases are the means of what the IMU said until then.
   void began_at_rest(std::optional<Time> end) { rest_until_ = end; }
-  /// How much of the last `span` before `t` was after that.
-  Duration since_rest(Time t, Duration span) const { return is_of_rest(t - span) ? std::max(Duration(0), t - *rest_until_) : span; }
 
   /// `e` came from the oldest estimate that will be replayed by advance(): a way to a later time may begin there instead.
   void remember(const Estimate& e);

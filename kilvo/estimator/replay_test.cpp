@@ -195,15 +195,6 @@ TEST(Replay, ClosedWhileTheLegsAreAheadItEndsAtTheSample) {
   EXPECT_EQ(way.closed.P, way.again.P);
 }
 
-TEST(Replay, OnlyWhatCameAfterTheRestCounts) {
-  Replay replay{EstimatorConfig{}};
-  EXPECT_EQ(replay.since_rest(begin_time, milliseconds(50)), milliseconds(50)) << "begun on the move";
-  replay.began_at_rest(begin_time);
-  EXPECT_EQ(replay.since_rest(begin_time - milliseconds(10), milliseconds(50)), milliseconds(0));
-  EXPECT_EQ(replay.since_rest(begin_time + milliseconds(20), milliseconds(50)), milliseconds(20));
-  EXPECT_EQ(replay.since_rest(begin_time + milliseconds(80), milliseconds(50)), milliseconds(50));
-}
-
 TEST(Replay, StepsBetweenTheSamplesTakeEffectAtTheirOwnTime) {
   const Replay replay = recorded(milliseconds(120), microseconds(300));
   const Time step = begin_time + milliseconds(100) + microseconds(300);

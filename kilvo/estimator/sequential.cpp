@@ -105,7 +105,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   constexpr double to_leave = 3.0;
   if (!weak_.isZero(0)) lidar.weak_share *= to_leave;
   LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar, workers_);
-  const UndistortionNoise within_scan = undistortion_noise(config_.noise, replay_.since_rest(centre, end - centre));
+  const UndistortionNoise within_scan = undistortion_noise(config_.noise, end - centre);
   const bool first = map_.empty();
   if (!register_sweep(prior, model, clusters, within_scan)) {
     refuse_sweep(end);
