@@ -47,7 +47,7 @@ tables: build
 	@bench/macro/tables --kilvo $(KILVO) $(or $(RECORDINGS),$(error RECORDINGS=DIR says where the recordings are))
 
 check: dependencies-dev configure
-	@scripts/check_rooms
+	@scripts/check_modules
 	@scripts/check_sizes
 	@clang-format-14 --dry-run --Werror $(SOURCES)
 	cmake --build --preset release --target all_verify_interface_header_sets

@@ -1,7 +1,7 @@
 # `cmake --install` gives a package that another project uses with find_package(kilvo); the target is kilvo::kilvo.
 include(CMakePackageConfigHelpers)
 
-install(TARGETS ${KILVO_ROOM_TARGETS} EXPORT kilvoTargets
+install(TARGETS ${KILVO_MODULE_TARGETS} EXPORT kilvoTargets
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
         FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(EXPORT kilvoTargets NAMESPACE kilvo:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/kilvo)

@@ -3,9 +3,9 @@
 #include <new>
 #include <string_view>
 
+#include "apps/cli/arguments.hpp"
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/verbs.hpp"
-#include "apps/cli/words.hpp"
 #include "lab/evaluation/align.hpp"
 #include "lab/evaluation/csv_reader.hpp"
 #include "lab/evaluation/trajectory_file.hpp"
@@ -41,7 +41,7 @@ int parse_and_do(const std::vector<std::string>& words) {
   for (CLI::App* verb : program.get_subcommands({})) verb->group("Verbs");
   program.footer(
       "Each verb has its own: kilvo VERB --help\nExit codes: 0 done, 1 the run failed, 2 wrong usage or configuration, 3 unusable input");
-  check_words(words, program);
+  check_arguments(words, program);
   try {
     std::vector<std::string> reversed = with_values(words);
     std::ranges::reverse(reversed);

@@ -40,14 +40,14 @@ void ResultFiles::write_state(const Output& output) {
   if (without_lidar && !output.is_sweep && (!last_state_ || output.t - *last_state_ >= state_period)) write_full_state(output);
   if (output.modality != last_modality_) write_modality(output);
   if (output.contacts) write_contacts(output);
-  recap_.add(output);
+  run_summary_.add(output);
 }
 
 void ResultFiles::write_sweep(const Output& output) {
   if (output.is_sweep) {
     sweeps_.write({output.t, output.x.pose()});
     write_full_state(output);
-    recap_.count_sweep();
+    run_summary_.count_sweep();
   }
   if (output.is_sweep || output.is_image) write_stages(output);
   write_indicators(output);
@@ -63,7 +63,7 @@ void ResultFiles::write_contacts(const Output& output) {
   contacts_->write(line);
   for (const auto& [stage, microseconds] : {std::pair("kinematic", output.kinematic_us), std::pair("contact", output.contact_us)}) {
     timing_.write(fmt::format("{},{},{:.1f}", t, stage, microseconds));
-    recap_.stages.add(stage, microseconds);
+    run_summary_.stages.add(stage, microseconds);
   }
 }
 
@@ -83,8 +83,8 @@ void ResultFiles::write_indicators(const Output& output) {
   lab::append_seconds(line, output.t);
   const auto flag = [](const std::string& value, bool on) { return value.empty() ? "" : on ? "1" : "0"; };
   degradation_->write(fmt::format("{},{},{},{},{},{}", line, ratio, share, points, flag(share, lidar), flag(points, visual)));
-  recap_.degraded["lidar"] += lidar ? 1 : 0;
-  recap_.degraded["visual"] += visual ? 1 : 0;
+  run_summary_.degraded["lidar"] += lidar ? 1 : 0;
+  run_summary_.degraded["visual"] += visual ? 1 : 0;
 }
 
 void ResultFiles::write_full_state(const Output& output) {
@@ -115,7 +115,7 @@ void ResultFiles::write_stages(const Output& output) {
   lab::append_seconds(t, output.t);
   const auto write = [&](const char* stage, double microseconds) {
     timing_.write(fmt::format("{},{},{:.1f}", t, stage, microseconds));
-    recap_.stages.add(stage, microseconds);
+    run_summary_.stages.add(stage, microseconds);
   };
   if (output.is_image) write("visual", stages.visual_us);
   if (!output.is_sweep) return;

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "apps/cli/csv_file.hpp"
-#include "apps/cli/recap.hpp"
+#include "apps/cli/run_summary.hpp"
 #include "kilvo/estimator/output.hpp"
 #include "kilvo/estimator/smooth_odometry.hpp"
 #include "lab/evaluation/trajectory_file.hpp"
@@ -24,7 +24,7 @@ class ResultFiles {
   void write_sweep(const Output& output);
   void close();
 
-  const Recap& recap() const { return recap_; }
+  const RunSummary& run_summary() const { return run_summary_; }
 
  private:
   void write_full_state(const Output& output);
@@ -41,7 +41,7 @@ class ResultFiles {
   std::optional<CsvFile> degradation_;  // from the first sweep or image on
   std::optional<Modality> last_modality_;
   std::optional<Time> last_state_;
-  Recap recap_;
+  RunSummary run_summary_;
 };
 
 }  // namespace kilvo::cli

@@ -80,7 +80,7 @@ class Run {
     if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map);
     facts_.map_points = map.size();
     facts_.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - facts_.begin).count();
-    write_text_file(options_.out / "summary.json", summary_json(facts_, settings_, source_, estimator_.statistics(), files_.recap()));
+    write_text_file(options_.out / "summary.json", summary_json(facts_, settings_, source_, estimator_.statistics(), files_.run_summary()));
     tell_end();
     return facts_.failure.empty() ? done : run_failed;
   }
@@ -153,32 +153,33 @@ class Run {
 
   std::string progress_note() const {
     if (!estimator_.initialised()) return estimator_.waiting_for();
-    const Recap& recap = files_.recap();
-    return fmt::format("{} sweeps, {:.1f} m", recap.sweeps(), recap.path_length());
+    const RunSummary& run_summary = files_.run_summary();
+    return fmt::format("{} sweeps, {:.1f} m", run_summary.sweeps(), run_summary.path_length());
   }
 
   std::string failure(bool interrupted) const {
-    const Recap& recap = files_.recap();
+    const RunSummary& run_summary = files_.run_summary();
     const bool with_lidar = !source_.topic(Sensor::lidar).empty();
     if (interrupted) return "stopped by the user";
-    if (recap.outputs() == 0) {
+    if (run_summary.outputs() == 0) {
       const std::string why = estimator_.waiting_for();
       return "nothing was estimated: " + (why.empty() ? "no measurements" : "still " + why);
     }
-    if (!recap.absurdity().empty()) return "diverged: " + recap.absurdity();
+    if (!run_summary.absurdity().empty()) return "diverged: " + run_summary.absurdity();
     if (estimator_.statistics().diverged) return "diverged: the estimator lost itself";
     const bool legs_used = estimator_.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
-    if (with_lidar && recap.sweeps() == 0 && !legs_used) return "no LiDAR scan could be used";
+    if (with_lidar && run_summary.sweeps() == 0 && !legs_used) return "no LiDAR scan could be used";
     return "";
   }
 
   void tell_end() const {
-    const Recap& recap = files_.recap();
+    const RunSummary& run_summary = files_.run_summary();
     for (const std::string& text : all_warnings(facts_, source_, estimator_.statistics())) fmt::print(stderr, "kilvo: warning: {}\n", text);
     if (!facts_.failure.empty()) fmt::print(stderr, "kilvo: error: {}\n", facts_.failure);
     if (options_.quiet) return;
     fmt::print("{}: {} poses, {} sweeps, path {:.2f} m, start to end {:.3f} m, {:.1f} s of data in {:.2f} s\n", options_.out.string(),
-               recap.outputs(), recap.sweeps(), recap.path_length(), recap.start_to_end(), recap.seconds(), facts_.wall_seconds);
+               run_summary.outputs(), run_summary.sweeps(), run_summary.path_length(), run_summary.start_to_end(), run_summary.seconds(),
+               facts_.wall_seconds);
   }
 
   const RunOptions& options_;

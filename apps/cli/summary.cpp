@@ -88,9 +88,9 @@ Json points_json(const RunFacts& facts, const lab::RecordingSource& source, cons
   return out;
 }
 
-Json stages_json(const Recap& recap) {
+Json stages_json(const RunSummary& run_summary) {
   Json out = Json::object();
-  for (const auto& [stage, q] : recap.stages.quantiles()) {
+  for (const auto& [stage, q] : run_summary.stages.quantiles()) {
     out[stage] = {{"p50", tenths(q.p50)}, {"p99", tenths(q.p99)}, {"max", tenths(q.max)}, {"n", q.n}};
   }
   return out;
@@ -147,36 +147,36 @@ std::vector<std::string> all_warnings(const RunFacts& facts, const lab::Recordin
 }
 
 std::string summary_json(const RunFacts& facts, const lab::Settings& settings, const lab::RecordingSource& source,
-                         const Statistics& statistics, const Recap& recap) {
+                         const Statistics& statistics, const RunSummary& run_summary) {
   Json json;
   json["version"] = KILVO_VERSION;
   json["input"] = facts.input;
   json["config_file"] = facts.config_file;
   json["failure"] = facts.failure.empty() ? Json() : Json(facts.failure);
-  json["diverged"] = statistics.diverged || !recap.absurdity().empty();
+  json["diverged"] = statistics.diverged || !run_summary.absurdity().empty();
   json["input_damaged"] = source.input_damaged();
   json["messages"] = messages_json(facts, source, statistics);
   json["health"] = health_json(facts, statistics);
   json["recovery"] = recovery_json(statistics, facts.live ? facts.live->clock_steps : 0);
-  json["degraded"] = recap.degraded;
+  json["degraded"] = run_summary.degraded;
   json["points"] = points_json(facts, source, statistics);
   json["warnings"] = all_warnings(facts, source, statistics);
   json["rollbacks"] = statistics.rollbacks;
   json["lost_stances"] = statistics.lost_stances;
-  json["contact_events"] = {{"left", recap.contact_events()[0]}, {"right", recap.contact_events()[1]}};
-  json["modality_seconds"] = recap.modality_seconds();
-  json["outputs"] = recap.outputs();
-  json["sweeps"] = recap.sweeps();
-  json["path_length_m"] = recap.path_length();
-  json["first_pose"] = pose_json(recap.first());
-  json["last_pose"] = pose_json(recap.last());
-  json["start_to_end_m"] = recap.start_to_end();
-  json["stage_us"] = stages_json(recap);
-  json["mean_ms_per_frame"] = recap.sweeps() == 0 ? 0 : recap.stages.total() * 1e-3 / static_cast<double>(recap.sweeps());
+  json["contact_events"] = {{"left", run_summary.contact_events()[0]}, {"right", run_summary.contact_events()[1]}};
+  json["modality_seconds"] = run_summary.modality_seconds();
+  json["outputs"] = run_summary.outputs();
+  json["sweeps"] = run_summary.sweeps();
+  json["path_length_m"] = run_summary.path_length();
+  json["first_pose"] = pose_json(run_summary.first());
+  json["last_pose"] = pose_json(run_summary.last());
+  json["start_to_end_m"] = run_summary.start_to_end();
+  json["stage_us"] = stages_json(run_summary);
+  json["mean_ms_per_frame"] = run_summary.sweeps() == 0 ? 0 : run_summary.stages.total() * 1e-3 / static_cast<double>(run_summary.sweeps());
   if (facts.live) add_live(json, facts);
-  json["data_seconds"] = recap.seconds();
+  json["data_seconds"] = run_summary.seconds();
   json["wall_seconds"] = facts.wall_seconds;
-  json["real_time_factor"] = facts.wall_seconds > 0 ? recap.seconds() / facts.wall_seconds : 0;
+  json["real_time_factor"] = facts.wall_seconds > 0 ? run_summary.seconds() / facts.wall_seconds : 0;
   json["peak_memory_mb"] = tenths(peak_memory_mb());
   json["config"] = config_json(settings);
   return json.dump(2, ' ', false, Json::error_handler_t::replace);

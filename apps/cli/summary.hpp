@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/cli/recap.hpp"
+#include "apps/cli/run_summary.hpp"
 #include "apps/live/live_runner.hpp"
 #include "kilvo/estimator/output.hpp"
 #include "lab/recordings/recording_source.hpp"
@@ -30,6 +30,6 @@ struct RunFacts {
 std::vector<std::string> all_warnings(const RunFacts& facts, const lab::RecordingSource& source, const Statistics& statistics);
 
 std::string summary_json(const RunFacts& facts, const lab::Settings& settings, const lab::RecordingSource& source,
-                         const Statistics& statistics, const Recap& recap);
+                         const Statistics& statistics, const RunSummary& run_summary);
 
 }  // namespace kilvo::cli

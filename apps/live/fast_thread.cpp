@@ -37,7 +37,7 @@ void LiveRunner::run_fast() {
 }
 
 void LiveRunner::take(const Sample& sample) {
-  Forerunner& runner = forks_.front().runner;
+  LivePropagator& runner = forks_.front().runner;
   if (sample.is_imu) {
     fast_raw_.keep(sample.imu);
     if (runner.push(sample.imu)) emit(sample.at);

@@ -24,7 +24,7 @@ LiveRunner::LiveRunner(Estimator& estimator, const Robot& robot, const Estimator
       config_(live),
       sinks_(std::move(sinks)),
       samples_(most_samples),
-      forks_({Forerunner(robot, config), std::nullopt}),
+      forks_({LivePropagator(robot, config), std::nullopt}),
       outputs_(most_outputs) {
   if (used_[static_cast<std::size_t>(Sensor::legs)]) {
     fast_kinematics_.emplace(robot);
@@ -138,7 +138,7 @@ void LiveRunner::run_slow() {
       if (!outputs.empty()) answer(outputs, a.at);
       ++processed_;
     }
-    if (Clock::now() - told_ >= tell_period) tell();
+    if (Clock::now() - sweep_noise_ >= tell_period) tell();
   }
   outputs = estimator_.finish();
   pass_on(outputs);
@@ -194,7 +194,7 @@ void LiveRunner::hand_over(std::optional<Clock::time_point> corrected) {
 }
 
 void LiveRunner::tell() {
-  told_ = Clock::now();
+  sweep_noise_ = Clock::now();
   const std::lock_guard lock(seen_mutex_);
   seen_ = estimator_.statistics();
   seen_.health = estimator_.health().streams();

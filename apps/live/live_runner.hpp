@@ -79,7 +79,7 @@ class LiveRunner {
     Clock::time_point at;
   };
   struct Fork {
-    Forerunner runner;
+    LivePropagator runner;
     std::optional<Clock::time_point> corrected;  // when the message arrived that completed a sweep or image; none of others
   };
 
@@ -135,7 +135,7 @@ class LiveRunner {
   RawSamples slow_raw_;
   std::optional<Time> last_fork_;
   std::optional<Modality> last_modality_;
-  Clock::time_point told_{};
+  Clock::time_point sweep_noise_{};
 
   mutable std::mutex seen_mutex_;  // and of the warnings
   Statistics seen_;

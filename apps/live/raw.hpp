@@ -1,11 +1,11 @@
-// The last samples of IMU and legs, with which each thread brings a forerunner up to date.
+// The last samples of IMU and legs, with which each thread brings a live propagator up to date.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <variant>
 
-#include "kilvo/estimator/forerunner.hpp"
+#include "kilvo/estimator/live_propagator.hpp"
 #include "kilvo/estimator/recent.hpp"
 
 namespace kilvo::live {
@@ -26,7 +26,7 @@ class RawSamples {
   }
 
   /// What `runner` does not know yet; what no later one will need is forgotten.
-  void catch_up(Forerunner& runner) {
+  void catch_up(LivePropagator& runner) {
     const auto stamp = [](const Raw& raw) { return std::visit([](const auto& s) { return s.t; }, raw); };
     const Time known = runner.known();
     while (!all_.empty() && stamp(*all_.begin()) < known) all_.pop_front();

@@ -11,7 +11,7 @@
 
 #include "apps/live/live_runner.hpp"
 #include "apps/ros1/diagnostics.hpp"
-#include "apps/ros1/map_room.hpp"
+#include "apps/ros1/map_thread.hpp"
 #include "apps/ros1/master_watch.hpp"
 #include "apps/ros1/parameters.hpp"
 #include "apps/ros1/sensor_inputs.hpp"
@@ -54,7 +54,7 @@ class Node {
   Parameters parameters_;
   lab::Settings settings_;
   StateOutlet states_;
-  MapRoom map_;
+  MapThread map_;
   std::optional<LegKinematics> kinematics_;  // of the thread of IMU and legs
 
   mutable std::shared_mutex life_mutex_;  // exclusive while one life ends and the next begins

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "kilvo/estimator/estimator.hpp"
-#include "kilvo/estimator/footfall.hpp"
+#include "kilvo/estimator/leg_update.hpp"
 #include "kilvo/estimator/silence.hpp"
 #include "kilvo/estimator/stopwatch.hpp"
 
@@ -24,7 +24,7 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   if (to_seconds(s.t - heard) > blind_gap) bridge(heard, out);
   recovery_.imu_lost = false;
   replay_.add(s);
-  calm_.add(s);
+  stationarity_.add(s);
   if (s.t < closed_.t) return;
   if (last_legs_ && health_.is_frozen(Sensor::legs)) lose_legs(s.t);
   if (last_legs_ && heard - *last_legs_ > silence_of_legs(robot_.legs.rate)) lose_legs(s.t);
@@ -39,22 +39,22 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   estimate_ = closed_;
   closing_us_ = last_legs_ ? closing_us_ + watch.lap_us() : 0;
   keep_finite();
-  if (s.t - anchor_.t > longest_replay && pending_.empty()) settle(closed_);
+  if (s.t - anchor_.t > longest_replay && pending_.empty()) rebase(closed_);
   choose_modality(s.t);
-  stand(s);
+  zero_velocity_update(s);
   if (!last_legs_ || are_legs_overdue(s.t - *last_legs_, robot_.legs.rate, leg_period_)) emit(out);
 }
 
 // On the legs alone, or beside a LiDAR that is blind one way, a wrong velocity makes standing feet look as if they moved, so that they are
 // not used, and nothing mends it. No flight lasts this long: the velocity is taken as unknown, and the feet as standing.
-void Estimator::keep_a_foothold(const LegStep& step, const std::array<bool, 2>& passed) {
-  const bool mended = modality_ != Modality::ki && weak_.isZero(0);
-  if (passed[0] || passed[1]) last_foothold_ = step.t;
+void Estimator::keep_a_stance(const LegStep& step, const std::array<bool, 2>& passed) {
+  const bool mended = modality_ != Modality::ki && unobservable_.isZero(0);
+  if (passed[0] || passed[1]) last_used_stance_ = step.t;
   if (passed[0] || passed[1] || mended) last_stance_ = step.t;
   if (step.t - last_stance_ < longest_flight) return;
   constexpr double unknown_velocity = 1.0;  // m/s
   for (Estimate* e : {&*estimate_, &closed_}) e->P.diagonal().segment<3>(at::v).array() += unknown_velocity * unknown_velocity;
-  settle(closed_);
+  rebase(closed_);
   contacts_.restart();
   stances_.restart();
   last_stance_ = step.t;
@@ -77,7 +77,7 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   replay_.predict_to(*estimate_, s.t, nullptr);
   // Beside a LiDAR the ground under a foot tells nothing new of the height, but how the feet stand on it.
   const auto ground = modality_ == Modality::ki ? StanceTracker::Ground::use : StanceTracker::Ground::learn;
-  const auto [step, passed, contact_us] = take_step(feet, *estimate_, contacts_, stances_, replay_, &map_, ground);
+  const auto [step, passed, contact_us] = update_by_legs(feet, *estimate_, contacts_, stances_, replay_, &map_, ground);
   if (!passed[0] && !passed[1]) ++statistics_.unsupported;
   keep_finite();
   // A sample of the IMU's own time belongs before the interval that begins there.
@@ -86,7 +86,7 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   const double kinematic_us = watch.lap_us();
 
   choose_modality(s.t);
-  keep_a_foothold(step, passed);
+  keep_a_stance(step, passed);
   emit(out, contacts_.contacts(), kinematic_us + std::exchange(closing_us_, 0), contact_us);
 }
 

@@ -35,7 +35,7 @@ double Estimator::least_offset(Sensor s) const {
 // A sweep that lasted from `begin` to `end` turned the state from `prior` to what it is.
 void Estimator::check_lidar_clock(const Estimate& prior, Time begin, Time end) {
   const auto first = trajectory_.at(begin), last = trajectory_.at(end);
-  if (!first || !last || end <= begin || !weak_.isZero(0) || recovery_.sweeps_to_go > 0) return;
+  if (!first || !last || end <= begin || !unobservable_.isZero(0) || recovery_.sweeps_to_go > 0) return;
   const Eigen::Vector3d rate = (first->R.inverse() * last->R).Log() / to_seconds(end - begin);
   lidar_clock_.add((prior.x.R.inverse() * estimate_->x.R).Log(), rate);
   if (lidar_clock_.is_doubtful()) mount_check_ = MountCheck();  // it may see nothing but this

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "kilvo/estimator/fault.hpp"
-#include "kilvo/estimator/forerunner.hpp"
+#include "kilvo/estimator/live_propagator.hpp"
 
 namespace kilvo {
 namespace {
@@ -45,7 +45,7 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       contacts_(config.legs),
       stances_(config.legs),
       health_(robot),
-      calm_(config.initial, unusual_acceleration) {
+      stationarity_(config.initial, unusual_acceleration) {
   if (!uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.leaf_size() * (1 + 1e-9))
     throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
@@ -266,7 +266,7 @@ Output Estimator::output_now() {
   return o;
 }
 
-bool Estimator::fork(Forerunner& into) const {
+bool Estimator::fork(LivePropagator& into) const {
   if (!estimate_ || !replay_.has_imu()) return false;
   into.started_ = true;
   into.imu_lost_ = recovery_.imu_lost;

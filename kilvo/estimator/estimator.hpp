@@ -28,7 +28,7 @@
 
 namespace kilvo {
 
-class Forerunner;
+class LivePropagator;
 
 class Estimator {
  public:
@@ -45,9 +45,9 @@ class Estimator {
   /// The same, appended to `out`: a caller that uses one vector again and again spares the leg path its only allocation.
   void push(Measurement m, std::vector<Output>& out);
 
-  /// For who cannot wait for sweeps and images: sets a forerunner to the present state, from which it goes on by itself. False, and nothing
-  /// is changed, before the start.
-  bool fork(Forerunner& into) const;
+  /// For who cannot wait for sweeps and images: sets a live propagator to the present state, from which it goes on by itself. False, and
+  /// nothing is changed, before the start.
+  bool fork(LivePropagator& into) const;
 
   /// No more measurements will come: what still waits is processed.
   std::vector<Output> finish();
@@ -89,16 +89,16 @@ class Estimator {
   // asynchronous.cpp: IMU and legs
   void handle_imu(ImuSample s, std::vector<Output>& out);
   void handle_legs(const JointSample& s, std::vector<Output>& out);
-  void keep_a_foothold(const LegStep& step, const std::array<bool, 2>& passed);
+  void keep_a_stance(const LegStep& step, const std::array<bool, 2>& passed);
 
   // switching.cpp: which sensors are used, and how they come back
-  void doubt_velocity();
+  void inflate_velocity_covariance();
   void choose_modality(Time t);
   void lose_imu(std::vector<Output>& out);
   void bridge(Time silent_since, std::vector<Output>& out);
   void lose_legs(Time t);
   bool legs_may_return(Time t);
-  void stand(const ImuSample& s);  // without any other sense, a robot that stands has no velocity
+  void zero_velocity_update(const ImuSample& s);  // without any other sense, a robot that stands has no velocity
   bool register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters,
                       const UndistortionNoise& within_scan);
   bool may_learn(const Estimate& prior, const RegistrationReport& report);
@@ -112,7 +112,7 @@ class Estimator {
   void process(const LidarScan& scan, Time end, std::vector<Output>& out);
   bool has_no_shape(const Estimate& prior) const;
   void learn(const LidarModel& model, const std::vector<PointCluster>& clusters);  // the map grows
-  void settle(const Estimate& e);                                                  // nothing before it will be replayed
+  void rebase(const Estimate& e);                                                  // nothing before it will be replayed
 
   // clocks.cpp: sensors whose stamps are off the IMU's
   void shift(Measurement& m) const;
@@ -131,8 +131,8 @@ class Estimator {
   bool is_lost_among_patches(const Estimate& prior) const;
   bool says_nothing(const PhotometricModel::Report& report);
   void check_mount(const PhotometricModel& model, const SO3& R_WI, const Eigen::Vector3d& omega);
-  void learn_from(const SE3& T_CI, const PhotometricModel& model, std::span<const Track> tracks, std::span<const GreyImage> pyramid,
-                  const DepthView& depth, const Estimate& prior, const Eigen::Vector3d& omega);
+  void learn_from(const SE3& T_CI, const PhotometricModel& model, std::span<const PatchCandidate> tracks,
+                  std::span<const GreyImage> pyramid, const DepthView& depth, const Estimate& prior, const Eigen::Vector3d& omega);
 
   Robot robot_;
   EstimatorConfig config_;
@@ -156,7 +156,7 @@ class Estimator {
   bool map_is_given_ = false;
   Workers workers_;
   MapError map_error_;
-  PoseCovariance weak_ = PoseCovariance::Zero();  // takes a pose error to its part along what the last sweep did not know
+  PoseCovariance unobservable_ = PoseCovariance::Zero();  // takes a pose error to its part along what the last sweep did not know
 
   std::optional<Camera> camera_;
   SE3 T_CI_;
@@ -177,7 +177,7 @@ class Estimator {
   TimeOffset lidar_clock_;
   std::array<Duration, sensor_count> shift_{};                          // found, and added to the stamps, by Sensor
   std::array<std::optional<std::size_t>, sensor_count> shift_is_said_;  // by which of the warnings
-  Time last_foothold_{};                                                // when a foot was used last
+  Time last_used_stance_{};                                             // when a foot was used last
   Time last_stance_{};                                                  // the same, or since when that is waited for
   Time last_sweep_{};                                                   // end of the last sweep, or the start
   Time last_middle_{};                                                  // of the last sweep
@@ -187,7 +187,7 @@ class Estimator {
   const char* cause_ = "start";
   ClockSteps clock_steps_;
   Health health_;
-  Calm calm_;
+  StationarityDetector stationarity_;
   Recovery recovery_;
   Statistics statistics_;
 };

@@ -95,9 +95,9 @@ TEST(Health, ClippedSamplesAreCounted) {
   EXPECT_FALSE(is_clipped(a, b));
 }
 
-TEST(Calm, StandsAfterHalfASecondOfRestAndNotInMotion) {
+TEST(StationarityDetector, StandsAfterHalfASecondOfRestAndNotInMotion) {
   for (const bool moving : {false, true}) {
-    Calm calm(InitialConfig{}, 10);
+    StationarityDetector calm(InitialConfig{}, 10);
     Stream stream(moving);
     for (int i = 0; i < 90; ++i) calm.add(stream.next());
     EXPECT_FALSE(calm.stands());

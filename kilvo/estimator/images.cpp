@@ -19,7 +19,7 @@ constexpr double new_scale = 0.4, new_angle = 0.25;
 // So many patches hold a pose by themselves.
 constexpr int enough = 20;
 
-bool is_new_view(const Track& track) {
+bool is_new_view(const PatchCandidate& track) {
   const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(track.warp.A.determinant()))));
   return octaves > new_scale || track.view_angle > new_angle;
 }
@@ -79,9 +79,9 @@ void Estimator::process(const CameraImage& image) {
   if (is_lost_among_patches(prior)) return drop(Sensor::camera, "the pose is too uncertain");
   const SE3 expected = *T_CI * prior.x.pose().inverse();
   const DepthView depth(*camera_, expected, seen_W_);
-  const std::vector<Track> tracks = select_tracks(visual_map_, *camera_, expected, depth, config_.vision);
+  const std::vector<PatchCandidate> tracks = select_patches(visual_map_, *camera_, expected, depth, config_.vision);
   PhotometricModel model(visual_map_, *camera_, *T_CI, pyramid, tracks, prior, config_.vision);
-  const Estimate unlit = prior;
+  const Estimate prior_before_exposure = prior;
   if (const auto exposure = model.exposure_at(prior.x)) {
     // Lamps are switched and exposures jump: what it was says nothing, the image all.
     prior.x.tau = std::exp(exposure->log);
@@ -93,7 +93,7 @@ void Estimator::process(const CameraImage& image) {
   UpdateConfig update_config = config_.update;
   update_config.min_iterations = model.iterations();
   update_config.max_iterations = std::max(update_config.max_iterations, model.iterations() + 2);
-  const bool blind = !weak_.isZero(0), feet_hold = blind && last_legs_ && image.t - last_foothold_ < longest_flight;
+  const bool blind = !unobservable_.isZero(0), feet_hold = blind && last_legs_ && image.t - last_used_stance_ < longest_flight;
   const auto measured = [&](const State& x, const Covariance& P) {
     Information<7> info = model(x, P);
     if (feet_hold) {
@@ -108,8 +108,8 @@ void Estimator::process(const CameraImage& image) {
   const Eigen::Vector3d omega = replay_.gyro_at(image.t).value_or(prior.x.bg) - prior.x.bg;
   if (at == image.t) check_mount(model, prior.x.R, omega);
   if (says_nothing(model.report())) {
-    estimate_ = unlit;
-    settle(*estimate_);
+    estimate_ = prior_before_exposure;
+    rebase(*estimate_);
     return drop(Sensor::camera, "agrees with nothing");
   }
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::camera)].used;
@@ -118,7 +118,7 @@ void Estimator::process(const CameraImage& image) {
   if (blind && !feet_hold && model.report().used >= enough) note_drift(model.by_frame(), T_WI);
   learn_from(*T_CI, model, tracks, pyramid, depth, prior, omega);
   check_camera_clock();
-  settle(*estimate_);
+  rebase(*estimate_);
   last_image_p_ = estimate_->x.p;
   if (model.report().used > 0) last_image_ = image.t;
   Output& seen = images_.emplace_back();
@@ -142,7 +142,7 @@ PoseCovariance Estimator::doubt_of_way(std::span<const PhotometricModel::FrameSh
   const double images = std::max(1.0, way / std::max(shortest_step, (T_WI.p - last_image_p_).norm()));
   PoseCovariance V = PoseCovariance::Zero();
   V.diagonal().tail<3>().setConstant(wrong_share * wrong_share * way * way * images);
-  return weak_ * V * weak_.transpose();
+  return unobservable_ * V * unobservable_.transpose();
 }
 
 Eigen::Vector3d Estimator::position_of(const VisualFrame& frame) const { return (frame.T_CW.inverse() * T_CI_).p; }
@@ -154,14 +154,14 @@ void Estimator::note_drift(std::span<const PhotometricModel::FrameShare> shares,
     const VisualFrame& from = visual_map_.frame(frame);
     views.push_back({from.error, (T_WI.p - position_of(from)).norm(), weight});
   }
-  map_error_.seen(T_WI, views, weak_);
+  map_error_.seen(T_WI, views, unobservable_);
 }
 
 // Patches are found within some pixels of where they are expected. Along what the LiDAR does not see the way is the images' own: it may be
 // uncertain, and new patches are begun there.
 bool Estimator::is_lost_among_patches(const Estimate& prior) const {
   constexpr double reach = 8, depth = 3;  // px, m
-  const PoseCovariance known = PoseCovariance::Identity() - weak_;
+  const PoseCovariance known = PoseCovariance::Identity() - unobservable_;
   const PoseCovariance P = known * prior.P.topLeftCorner<6, 6>() * known.transpose();
   const double turned = P.topLeftCorner<3, 3>().trace(), moved = P.bottomRightCorner<3, 3>().trace();
   return robot_.camera.fx * std::sqrt(std::max(0.0, turned + moved / (depth * depth))) > reach;
@@ -193,11 +193,11 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI, cons
                                  "camera.time_offset right? Images are not used any more");
 }
 
-void Estimator::learn_from(const SE3& T_CI, const PhotometricModel& model, std::span<const Track> tracks,
+void Estimator::learn_from(const SE3& T_CI, const PhotometricModel& model, std::span<const PatchCandidate> tracks,
                            std::span<const GreyImage> pyramid, const DepthView& depth, const Estimate& prior,
                            const Eigen::Vector3d& omega) {
-  const PoseCovariance known = PoseCovariance::Identity() - weak_;
-  const SE3 T_WI = as_the_map_has_it(prior.x, estimate_->x, weak_);
+  const PoseCovariance known = PoseCovariance::Identity() - unobservable_;
+  const SE3 T_WI = as_the_map_has_it(prior.x, estimate_->x, unobservable_);
   const SE3 T_CW = T_CI * T_WI.inverse();
   VisualFrame frame;
   frame.T_CW = T_CW;
@@ -218,12 +218,12 @@ void Estimator::learn_from(const SE3& T_CI, const PhotometricModel& model, std::
   // A point is not denied by an image that agrees with few others either.
   const bool is_good = 2 * model.report().used > model.report().tracks;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
-    const Track& track = tracks[i];
+    const PatchCandidate& track = tracks[i];
     const PhotometricModel::Verdict& verdict = model.verdicts()[i];
     if (verdict.used) {
       VisualPoint point = visual_map_.point(track.point);
       const SE3& first = visual_map_.frame(visual_map_.observation(point.observations[0]).frame).T_CW;
-      if (lay_on_plane(map_, -(first.R.inverse() * first.p), point))
+      if (project_to_plane(map_, -(first.R.inverse() * first.p), point))
         visual_map_.refresh(track.point, point.p_W, point.normal_W, point.variance, point.node);
       const auto pixel = camera_->project(T_CW * point.p_W);
       if (is_new_view(track) && pixel && camera_->sees(*pixel, 20)) {

@@ -72,10 +72,10 @@ void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epo
   PoseCovariance root = PoseCovariance::Zero();
   for (const EpochInformation& e : epochs) root += inverse * e.A * root_of(G * epochs_[e.epoch] * G.transpose());
   // Planes that are not quite planes move the pose most along the directions that few of them hold.
-  const Eigen::Matrix3d looseness =
+  const Eigen::Matrix3d variance_scale =
       (A.bottomRightCorner<3, 3>().trace() / 3.0) * inverse.bottomRightCorner<3, 3>();  // 1 where all are held equally
   PoseCovariance systematic = PoseCovariance::Zero();
-  systematic.bottomRightCorner<3, 3>() = plane_error * plane_error * looseness * looseness;
+  systematic.bottomRightCorner<3, 3>() = plane_error * plane_error * variance_scale * variance_scale;
   const PoseCovariance H = to_origin(T_WI);
   now_ = H * (root * root.transpose() + systematic + weak * at(T_WI) * weak.transpose()) * H.transpose();
 }

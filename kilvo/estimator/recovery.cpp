@@ -17,7 +17,7 @@ constexpr double block = 0.25;           // s
 
 }  // namespace
 
-void widen(Estimate& e, Time begin, Time end, double gap) {
+void inflate_covariance_over_gap(Estimate& e, Time begin, Time end, double gap) {
   const double share = gap > 0 ? std::clamp(to_seconds(end - begin) / gap, 0.0, 1.0) : 1.0;
   const double lean = std::min(leaning, turning * gap), turn = turning * gap;
   const double dv = std::min(velocity + more_velocity * gap, acceleration * gap), dp = dv * gap;
@@ -32,13 +32,13 @@ void widen(Estimate& e, Time begin, Time end, double gap) {
   e.P.diagonal(at::p - at::v).segment<3>(at::p).array() += 0.5 * share * dv * dp;
 }
 
-void Calm::restart() {
+void StationarityDetector::restart() {
   begin_.reset();
   usual_since_.reset();
   quiet_blocks_ = 0;
 }
 
-void Calm::close_block() {
+void StationarityDetector::close_block() {
   const Eigen::Vector3d gyro = gyro_ / n_, accel = accel_ / n_;
   const Eigen::Vector3d gyro_sigma = (gyro2_ / n_ - gyro.cwiseAbs2()).cwiseMax(0).cwiseSqrt();
   const Eigen::Vector3d accel_sigma = (accel2_ / n_ - accel.cwiseAbs2()).cwiseMax(0).cwiseSqrt();
@@ -49,7 +49,7 @@ void Calm::close_block() {
   resting_gyro_ = gyro;
 }
 
-void Calm::add(const ImuSample& s) {
+void StationarityDetector::add(const ImuSample& s) {
   if (!begin_) {
     begin_ = s.t;
     n_ = 0;

@@ -20,13 +20,13 @@ inline constexpr Duration longest_flight = std::chrono::milliseconds(500);
 inline constexpr double known_velocity = 0.15;
 
 /// Adds to the covariance what a walking robot may have done in the part [begin, end] of a gap.
-void widen(Estimate& e, Time begin, Time end, double gap);
+void inflate_covariance_over_gap(Estimate& e, Time begin, Time end, double gap);
 
 /// What the IMU alone says of the motion: whether it stands still, and how unusual the acceleration is now. No memory of samples, so
 /// that it costs nothing.
-class Calm {
+class StationarityDetector {
  public:
-  Calm(const InitialConfig& config, double theta) : config_(config), theta_(theta) {}
+  StationarityDetector(const InitialConfig& config, double theta) : config_(config), theta_(theta) {}
 
   void add(const ImuSample& s);
   void restart();

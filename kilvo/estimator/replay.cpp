@@ -42,7 +42,7 @@ void Replay::note_usual(const ImuSample& s) {
 }
 
 // Samples are missing: they lay beside the line between those that came.
-void Replay::say_missed(ImuInterval& interval, double gap) const {
+void Replay::inflate_for_missed(ImuInterval& interval, double gap) const {
   const double missed = usual_.period > 0 ? std::round(gap / usual_.period) - 1 : 0;
   if (missed < 1) return;
   // The farther the neighbours, the farther beside; and all of them on the same side.
@@ -52,7 +52,7 @@ void Replay::say_missed(ImuInterval& interval, double gap) const {
 }
 
 // Beyond the end of its range an IMU may have seen anything of the same size.
-void Replay::say_clipped(ImuInterval& interval) const {
+void Replay::inflate_for_clipping(ImuInterval& interval) const {
   constexpr double gyro = 3, accel = 20;  // rad/s, m/s^2: what may be missing
   constexpr double correlation = 0.01;    // s: it stays missing for so long
   interval.gyro_scale = gyro * gyro * correlation / (config_.noise.gyro * config_.noise.gyro);
@@ -60,7 +60,7 @@ void Replay::say_clipped(ImuInterval& interval) const {
 }
 
 // No body turns or is pushed so much otherwise within one sample: one of the two is wrong, or hardly anything is known of what was between.
-void Replay::say_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
+void Replay::inflate_for_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
   constexpr double gyro = 3, accel = 100;  // rad/s, m/s^2
   const double dt = to_seconds(b.t - a.t), turned = (b.gyro - a.gyro).norm(), pushed = (b.accel - a.accel).norm();
   const auto scale = [dt](double jump, double noise) { return jump * jump * dt / (noise * noise); };
@@ -82,9 +82,9 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   ImuInterval interval = ImuInterval::between(a, b, begin, end);
   const double gap = to_seconds(b.t - a.t);
   if (gap <= config_.max_imu_gap) {
-    if (is_clipped(a, b)) say_clipped(interval);
-    say_jump(interval, a, b);
-    say_missed(interval, gap);
+    if (is_clipped(a, b)) inflate_for_clipping(interval);
+    inflate_for_jump(interval, a, b);
+    inflate_for_missed(interval, gap);
     return interval;
   }
   // What was missed is about what varied before, constant over the gap: as a density, times the gap.
@@ -93,7 +93,7 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
                accel2 = usual_.accel_variance.sum() + least_accel * least_accel;
   interval.gyro_scale = gyro2 * gap / (config_.noise.gyro * config_.noise.gyro);
   interval.accel_scale = accel2 * gap / (config_.noise.accel * config_.noise.accel);
-  if (gap > blind_gap) interval.accel_scale = 1;  // more is added after the prediction (widen)
+  if (gap > blind_gap) interval.accel_scale = 1;  // more is added after the prediction (inflate_covariance_over_gap)
   constexpr double told_by_its_ends = 0.25;       // s
   if (gap > told_by_its_ends) {
     // The two samples say nothing of the time between.
@@ -121,9 +121,9 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   const auto step = [&](ImuInterval interval) {
     // What was missed or clipped is in no mean.
     interval.made_biases = is_of_rest(interval.end) && interval.gyro_scale == 1 && interval.accel_scale == 1;
-    if (interval.begin < told_.until) {
-      interval.gyro_scale *= 1 - told_.rotation;
-      interval.velocity_scale *= 1 - told_.position;
+    if (interval.begin < sweep_noise_.until) {
+      interval.gyro_scale *= 1 - sweep_noise_.rotation;
+      interval.velocity_scale *= 1 - sweep_noise_.position;
     }
     e = predict(e, interval, feet, config_.noise);
     if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
@@ -135,7 +135,7 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
     const Time begin = e.t;
     const double gap = to_seconds(next->t - a.t);
     step(interval_between(a, *next, begin, std::min(until, next->t), e.x));
-    if (gap > blind_gap) widen(e, begin, e.t, gap);
+    if (gap > blind_gap) inflate_covariance_over_gap(e, begin, e.t, gap);
   }
   if (e.t >= until) return;
   ImuSample held = imu_.back();
@@ -243,7 +243,7 @@ void Replay::copy_since(Time t, const Replay& other) {
   for (std::size_t i = 0; i < other.steps_.size(); ++i) {
     if (i + 1 >= other.steps_.size() || other.steps_[i + 1].t > t) steps_.push_back(other.steps_[i]);
   }
-  told_ = other.told_;
+  sweep_noise_ = other.sweep_noise_;
   rest_until_ = other.rest_until_;
   usual_ = other.usual_;
 }

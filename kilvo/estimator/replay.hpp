@@ -51,7 +51,7 @@ class Replay {
 
   /// A sweep until `end` has been used with points that the IMU's motion took to its middle: what they told of the pose holds these shares
   /// of what the IMU will get wrong in rotation and in position until then.
-  void sweep_told(Time end, double rotation, double position) { told_ = {end, rotation, position}; }
+  void correlate_with_sweep(Time end, double rotation, double position) { sweep_noise_ = {end, rotation, position}; }
 
   /// The robot stood still until `end`, if it did, and the first biases are the means of what the IMU said until then.
   void began_at_rest(std::optional<Time> end) { rest_until_ = end; }
@@ -83,19 +83,19 @@ class Replay {
   bool is_of_rest(Time end) const { return rest_until_ && end <= *rest_until_; }
   LegModel::Used apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept = nullptr) const;
   bool retrace(Estimate& e, const Estimate& live, Time until, Trajectory* record) const;
-  void say_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
-  void say_clipped(ImuInterval& interval) const;
-  void say_missed(ImuInterval& interval, double gap) const;
+  void inflate_for_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
+  void inflate_for_clipping(ImuInterval& interval) const;
+  void inflate_for_missed(ImuInterval& interval, double gap) const;
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
   FootOrientations standing_at(Time t) const;
 
-  struct Told {
+  struct SweepNoiseCorrelation {
     Time until{};
     double rotation = 0, position = 0;
   };
 
   EstimatorConfig config_;
-  Told told_;
+  SweepNoiseCorrelation sweep_noise_;
   std::optional<Time> rest_until_;
   Recent<ImuSample> imu_;
   Recent<LegStep> steps_;

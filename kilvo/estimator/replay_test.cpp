@@ -33,7 +33,7 @@ LegStep leg_at(Duration since) {
     foot.point.p = {0.05 * std::sin(4 * s), side == 0 ? 0.1 : -0.1, -0.75};
     foot.point.v = {0.2 * std::cos(4 * s), 0.01, 0};
     if (!foot.begins) foot.shift = {1e-5, 0, 0};
-    foot.looseness = 1 + s;
+    foot.variance_scale = 1 + s;
   }
   return step;
 }

@@ -27,14 +27,14 @@ std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE
 // that a sweep's correction of the middle has taken off. Half of it goes with the points' mean, G = 1 - P+ P^-1 of that into the pose:
 // P(end) = P+ + Q - G Q / 4 - Q G' / 4.
 template <int part>
-double told_share(const Estimate& prior, const Estimate& posterior) {
+double shared_with_sweep(const Estimate& prior, const Estimate& posterior) {
   const Eigen::Matrix3d left = posterior.P.block<3, 3>(part, part) * prior.P.block<3, 3>(part, part).inverse();
   return 0.5 * std::clamp(1 - left.trace() / 3, 0.0, 1.0);
 }
 
 }  // namespace
 
-void Estimator::settle(const Estimate& e) {
+void Estimator::rebase(const Estimate& e) {
   anchor_ = e;
   replay_.forget_before(anchor_.t);
 }
@@ -42,7 +42,7 @@ void Estimator::settle(const Estimate& e) {
 // The map grows by what a sweep saw, and takes over how uncertain the pose was.
 void Estimator::learn(const LidarModel& model, const std::vector<PointCluster>& clusters) {
   const SE3 T_WI = estimate_->x.pose();
-  map_error_.registered(T_WI, model.by_epoch(), weak_);
+  map_error_.registered(T_WI, model.by_epoch(), unobservable_);
   const std::uint32_t epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
   map_.insert(to_world(clusters, T_WI, robot_.lidar.T_imu_lidar.p, config_.lidar), epoch);
   map_.forget(estimate_->x.p);
@@ -103,7 +103,7 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   LidarConfig lidar = config_.lidar;
   // With hysteresis: each change of mind would hand what was drifted since to the map.
   constexpr double to_leave = 3.0;
-  if (!weak_.isZero(0)) lidar.weak_share *= to_leave;
+  if (!unobservable_.isZero(0)) lidar.weak_share *= to_leave;
   LidarModel model(map_, clusters, p_IL, map_error_.at(prior.x.pose()), lidar, workers_);
   const UndistortionNoise within_scan = undistortion_noise(config_.noise, end - centre);
   const bool first = map_.empty();
@@ -119,12 +119,12 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   if (good) {
     check_lidar_clock(prior, begin_of(scan), end);
     trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
-    weak_ = weak_part(model.report().degeneracy);
-    if (!first) replay_.sweep_told(end, told_share<at::R>(prior, *estimate_), told_share<at::p>(prior, *estimate_));
+    unobservable_ = weak_part(model.report().degeneracy);
+    if (!first) replay_.correlate_with_sweep(end, shared_with_sweep<at::R>(prior, *estimate_), shared_with_sweep<at::p>(prior, *estimate_));
     const bool sure = may_learn(prior, model.report());
-    if (map_is_given_) map_error_.registered_to_given(T_WI, model.by_epoch(), model.systematic(), weak_);
+    if (map_is_given_) map_error_.registered_to_given(T_WI, model.by_epoch(), model.systematic(), unobservable_);
     if (!map_is_given_ && sure) learn(model, clusters);
-    settle(*estimate_);
+    rebase(*estimate_);
   }
   stages.map_us = watch.lap_us();
 

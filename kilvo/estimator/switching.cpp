@@ -63,14 +63,14 @@ void Estimator::choose_modality(Time t) {
     }
   }
   modality_ = now;
-  if (now == Modality::coast && pending_.empty()) doubt_velocity();
+  if (now == Modality::coast && pending_.empty()) inflate_velocity_covariance();
 }
 
 // What has failed may have been wrong before it was missed, and nothing will tell.
-void Estimator::doubt_velocity() {
+void Estimator::inflate_velocity_covariance() {
   constexpr double sigma = 0.003;  // m/s
   for (Estimate* e : {&*estimate_, &closed_}) e->P.diagonal().segment<3>(at::v).array() += sigma * sigma;
-  settle(closed_);
+  rebase(closed_);
 }
 
 // Said at once, on the last output's heels; from then on there is no pose.
@@ -81,7 +81,7 @@ void Estimator::lose_imu(std::vector<Output>& out) {
   modality_ = Modality::coast;
   cause_ = health_.is_frozen(Sensor::imu) ? "imu frozen" : "imu lost";
   const Estimate kept = *estimate_;
-  widen(*estimate_, kept.t, kept.t + from_seconds(blind_gap), blind_gap);
+  inflate_covariance_over_gap(*estimate_, kept.t, kept.t + from_seconds(blind_gap), blind_gap);
   estimate_->t = std::max(kept.t, last_output_.value_or(kept.t) + Duration(1000));
   emit(out);
   estimate_ = kept;
@@ -92,7 +92,7 @@ void Estimator::bridge(Time silent_since, std::vector<Output>& out) {
   lose_imu(out);
   recovery_.imu_lost = false;
   recovery_.sweeps_to_go = consistent_sweeps;
-  calm_.restart();
+  stationarity_.restart();
   if (last_legs_) lose_legs(silent_since);
 }
 
@@ -122,7 +122,7 @@ bool Estimator::legs_may_return(Time t) {
   // Sweeps, if there are any, tell the velocity soon.
   const auto heard = health_.heard(Sensor::lidar);
   const bool sweeps = heard && t - *heard < silence(robot_.lidar.rate, 4, std::chrono::milliseconds(300));
-  const bool ready = calm_.is_usual(t, calm) && (sigma_v < known_velocity || !sweeps);
+  const bool ready = stationarity_.is_usual(t, calm) && (sigma_v < known_velocity || !sweeps);
   if (!ready && t - *recovery_.legs_waiting < longest_wait) return false;
   recovery_.legs_waiting.reset();
   last_stance_ = t;
@@ -130,10 +130,10 @@ bool Estimator::legs_may_return(Time t) {
 }
 
 // Nothing else measures, and the IMU looks like that of a robot at rest: it does not move, and up is where the accelerometer says.
-void Estimator::stand(const ImuSample& s) {
+void Estimator::zero_velocity_update(const ImuSample& s) {
   constexpr Duration period = std::chrono::milliseconds(100);
   constexpr double velocity_sigma = 0.01, accel_sigma = 0.2;  // m/s, m/s^2
-  if (modality_ != Modality::coast || !calm_.stands() || !pending_.empty()) return;
+  if (modality_ != Modality::coast || !stationarity_.stands() || !pending_.empty()) return;
   if (recovery_.last_standing && s.t - *recovery_.last_standing < period) return;
   recovery_.last_standing = s.t;
   const auto at_rest = [&s](const State& x, const Covariance&) {
@@ -153,7 +153,7 @@ void Estimator::stand(const ImuSample& s) {
   };
   closed_ = update(closed_, at_rest, config_.update).posterior;
   estimate_ = closed_;
-  if (keep_finite()) settle(closed_);
+  if (keep_finite()) rebase(closed_);
 }
 
 // False: the sweep fits nowhere, and says nothing of the state.
@@ -161,7 +161,7 @@ bool Estimator::register_sweep(const Estimate& prior, LidarModel& model, const s
                                const UndistortionNoise& within_scan) {
   estimate_ = prior;
   if (map_.empty()) return true;
-  if (!needs_search(prior.P, PoseCovariance::Identity() - weak_)) {
+  if (!needs_search(prior.P, PoseCovariance::Identity() - unobservable_)) {
     UpdateConfig patient = config_.update;
     if (recovery_.sweeps_to_go > 0) patient.max_iterations *= 3;
     const PoseCovariance noise = recovery_.sweeps_to_go > 0 ? within_scan.V + noise_of_velocity(prior.P) : within_scan.V;
@@ -205,7 +205,7 @@ void Estimator::refuse_sweep(Time t) {
   if (map_is_given_ || t - *recovery_.refused_since < longest_refusal) return;
   map_ = VoxelMap(config_.map);
   visual_map_ = VisualMap(config_.visual_map);
-  weak_.setZero();
+  unobservable_.setZero();
   recovery_.refused_since.reset();
   recovery_.sweeps_to_go = 0;
   ++statistics_.maps_begun_anew;

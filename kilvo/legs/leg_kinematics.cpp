@@ -47,12 +47,12 @@ void add_children(const urdf::Link& link, const Robot& robot, KDL::Tree& tree) {
 }
 
 // Keeps what the parser has to say, instead of letting it print, as long as this lives.
-class ParserWords final : public console_bridge::OutputHandler {
+class UrdfLog final : public console_bridge::OutputHandler {
  public:
-  ParserWords() { console_bridge::useOutputHandler(this); }
-  ~ParserWords() override { console_bridge::restorePreviousOutputHandler(); }
-  ParserWords(const ParserWords&) = delete;
-  ParserWords& operator=(const ParserWords&) = delete;
+  UrdfLog() { console_bridge::useOutputHandler(this); }
+  ~UrdfLog() override { console_bridge::restorePreviousOutputHandler(); }
+  UrdfLog(const UrdfLog&) = delete;
+  UrdfLog& operator=(const UrdfLog&) = delete;
   void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
     if (first_.empty() && level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) first_ = ": " + text;
   }
@@ -63,7 +63,7 @@ class ParserWords final : public console_bridge::OutputHandler {
 };
 
 KDL::Tree tree_of(const Robot& robot) {
-  const ParserWords words;
+  const UrdfLog words;
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(robot.urdf);
   if (!model || !model->getRoot()) throw std::invalid_argument("robot.urdf is not a URDF document" + words.first());
   KDL::Tree tree(model->getRoot()->name);
@@ -151,13 +151,13 @@ struct LegKinematics::Chains {
   std::vector<double> last_position, velocity;
   Time last_t{};
 
-  std::optional<std::string> find_places(const std::vector<std::string>& names);
+  std::optional<std::string> look_up_planes(const std::vector<std::string>& names);
   const std::vector<double>* velocity_of(const JointSample& s);  // nullptr: not known
   FootPose pose_of(std::size_t side, const JointSample& s, const std::vector<double>& velocity);
 };
 
 // Where in a message of these names each joint is.
-std::optional<std::string> LegKinematics::Chains::find_places(const std::vector<std::string>& names) {
+std::optional<std::string> LegKinematics::Chains::look_up_planes(const std::vector<std::string>& names) {
   if (names == message_names) return std::nullopt;
   for (Leg& leg : legs) {
     leg.places.clear();
@@ -248,7 +248,7 @@ std::variant<Feet, std::string> LegKinematics::feet(const JointSample& s) {
   Chains& c = *chains_;
   if (c.by_joints) {
     if (s.names.size() != s.position.size()) return "as many names as positions are needed";
-    if (auto missing = c.find_places(s.names)) return std::move(*missing);
+    if (auto missing = c.look_up_planes(s.names)) return std::move(*missing);
   } else if (s.position.size() != 6) {
     return "two feet need six positions";
   }

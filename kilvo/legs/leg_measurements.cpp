@@ -66,7 +66,7 @@ FootHeightRow foot_height(const GroundPatch& ground, const Eigen::Vector3d& pc) 
 }
 
 // The chi-square gate, velocity and position each by itself, as they are and not as densities: is this foot moving, has it moved? Not
-// with the looseness of Eq. 8, which grows with the speed and would let everything pass.
+// with the variance_scale of Eq. 8, which grows with the speed and would let everything pass.
 bool LegModel::moves(const Covariance& prior, std::size_t side, const Eigen::Vector3d& velocity, const Eigen::Vector3d& offset) const {
   const int pc = at::pcl + 3 * static_cast<int>(side);
   const double gate2 = config_.gate * config_.gate;
@@ -98,12 +98,12 @@ bool LegModel::add_motion(LegRows& rows, int count, std::size_t side, const Stat
   rows.r.segment<3>(count + 3) = p.r;
   // A density: rows within one correlation time say it once together.
   const double dt = step_.dt;
-  const double along = std::max(1.0, config_.velocity_correlation / dt) * foot.looseness;
+  const double along = std::max(1.0, config_.velocity_correlation / dt) * foot.variance_scale;
   const Eigen::Vector3d up_W = -x.g.normalized();
   const double vertical2 = config_.vertical_velocity_sigma * config_.vertical_velocity_sigma;
   rows.R.block<3, 3>(count, count) = along * (vertical2 - velocity2) * up_W * up_W.transpose();
   rows.R.diagonal().segment<3>(count).array() += along * velocity2;
-  rows.R.diagonal().segment<3>(count + 3).setConstant(foot.looseness * position2 * std::max(1.0, config_.position_correlation / dt));
+  rows.R.diagonal().segment<3>(count + 3).setConstant(foot.variance_scale * position2 * std::max(1.0, config_.position_correlation / dt));
   return true;
 }
 
@@ -279,7 +279,7 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
     const double entering = std::max(0.0, 1.0 - (phase - config_.entry_delay) / entry_time);
     // As much as the noise across on all three axes is no motion.
     const double loose = 1.0 + std::max(0.0, moving2 / noise2 - 3.0) + (loosest - 1) * entering;
-    foot.looseness = std::min(loose, loosest * loosest);
+    foot.variance_scale = std::min(loose, loosest * loosest);
   }
   return out;
 }

@@ -19,7 +19,7 @@ struct Stance {
   bool used = false;                                // it stands: rows are made of it
   SolePoint point;                                  // on which it stands; IMU frame
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();  // from where the point was in the sole before to where it is now; IMU frame, m
-  double looseness = 1;                             // factor on the variance of its rows (Eq. 8)
+  double variance_scale = 1;                        // factor on the variance of its rows (Eq. 8)
   SO3 R_IF;
   std::optional<GroundPatch> ground;  // on which it has just come down: its height counts once
 };

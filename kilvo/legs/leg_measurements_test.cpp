@@ -148,7 +148,7 @@ TEST(LegMeasurements, TheGateDoesNotOpenForAFootThatIsLooseBecauseItMoves) {
   const LegConfig config;
   LegStep step = both_stand();
   LegModel model(step, Eigen::Vector3d::Zero(), config);
-  step.foot[0].looseness = 100;
+  step.foot[0].variance_scale = 100;
   step.foot[0].point.v = {0.25, 0, 0};
   model(e.x, e.P);
   EXPECT_EQ(model.used().motion, (std::array<bool, 2>{false, true}));

@@ -235,13 +235,13 @@ TEST(StanceTracker, AFootEntersAfterItsDelayLooselyAndLeavesWithItsContact) {
       EXPECT_EQ(foot.begins, foot.used && !inside[side]);
       EXPECT_EQ(foot.ends, !foot.used && inside[side]);
       if (foot.begins && i > 100) {
-        EXPECT_GT(foot.looseness, 9);
+        EXPECT_GT(foot.variance_scale, 9);
         EXPECT_NEAR(contacts.phase(side, feet.t), config.entry_delay, 0.0011);
         ++entered;
       }
       left += foot.ends ? 1 : 0;
       const bool settled = foot.used && contacts.phase(side, feet.t) > 0.1 && gait.stands(side, s);
-      EXPECT_TRUE(!settled || foot.looseness < 1.001);
+      EXPECT_TRUE(!settled || foot.variance_scale < 1.001);
       inside[side] = foot.used;
     }
   }

@@ -96,7 +96,7 @@ bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluste
 }
 
 // A cluster that is still in the leaf where the last iterate put it finds the same there.
-void LidarModel::find_places(std::size_t first, std::size_t last, const SE3& T_WI) {
+void LidarModel::look_up_planes(std::size_t first, std::size_t last, const SE3& T_WI) {
   std::array<Eigen::Vector3d, block> points;
   std::array<std::size_t, block> wanted;
   std::array<VoxelMap::Match, block> found;
@@ -189,7 +189,7 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   report_.clusters = static_cast<int>(clusters_.size());
   report_.rejected = workers_.sum(clusters_.size(), block, 0, [&](std::size_t first, std::size_t last) {
     int rejected = 0;
-    find_places(first, last, T_WI);
+    look_up_planes(first, last, T_WI);
     for (std::size_t i = first; i < last; ++i) associations_[i] = associate(i, at, rejected);
     return rejected;
   });

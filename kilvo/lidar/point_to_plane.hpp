@@ -72,7 +72,7 @@ class LidarModel {
     SE3 T_WI;
     PoseCovariance P;
   };
-  void find_places(std::size_t first, std::size_t last, const SE3& T_WI);
+  void look_up_planes(std::size_t first, std::size_t last, const SE3& T_WI);
   Association associate(std::size_t i, const Iterate& at, int& rejected) const;
   bool accept(const VoxelMap::Match& match, const PointCluster& cluster, const Iterate& at, Association& out) const;
   void add_row(std::size_t i, const SE3& T_WI, Sums& sums);

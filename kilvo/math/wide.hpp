@@ -1,5 +1,5 @@
-// Numbers that are worked on together. Functions that do so are marked KILVO_WIDE (cmake/kilvo_room.cmake): compiled for any processor and
-// for those with wide registers.
+// Numbers that are worked on together. Functions that do so are marked KILVO_WIDE (cmake/kilvo_module.cmake): compiled for any processor
+// and for those with wide registers.
 #pragma once
 
 #include <cstddef>

@@ -16,7 +16,7 @@ constexpr double grazing = 0.2;
 
 }  // namespace
 
-bool lay_on_plane(const VoxelMap& map, const Eigen::Vector3d& eye_W, VisualPoint& point) {
+bool project_to_plane(const VoxelMap& map, const Eigen::Vector3d& eye_W, VisualPoint& point) {
   constexpr double near = 0.15;  // m
   const Eigen::Vector3d ray = point.p_W - eye_W;
   return map.visit_planes(point.p_W, [&](const VoxelMap::Match& match) {
@@ -52,7 +52,7 @@ struct Search {
     found.pixel = pixel;
     found.point.corner = corner;
     found.point.p_W = T_WC * (static_cast<double>(s.depth) * *ray);
-    if (!lay_on_plane(map, T_WC.p, found.point)) return std::nullopt;
+    if (!project_to_plane(map, T_WC.p, found.point)) return std::nullopt;
     const Eigen::Vector3d n = found.point.normal_W.cast<double>();
     const Eigen::Vector3d facing = n.dot(T_WC.p - found.point.p_W) > 0 ? n : Eigen::Vector3d(-n);
     if (depth.hides(pixel, found.point.p_W, facing, static_cast<double>(s.depth))) return std::nullopt;
@@ -84,11 +84,11 @@ Eigen::Vector2d pixel_of(const DepthView::Seen& s) {
 }
 
 // One even patch in each block of the image that has nothing else.
-void add_plain(const Search& search, int block, std::span<const Track> tracks, std::vector<NewPoint>& out) {
+void add_plain(const Search& search, int block, std::span<const PatchCandidate> tracks, std::vector<NewPoint>& out) {
   constexpr float some = 1e-3F;  // of a corner
   const CellGrid blocks(search.camera, block);
   std::vector<bool> taken(blocks.size(), false);
-  for (const Track& t : tracks) taken[blocks.of(t.pixel)] = true;
+  for (const PatchCandidate& t : tracks) taken[blocks.of(t.pixel)] = true;
   for (const NewPoint& p : out) taken[blocks.of(p.pixel)] = true;
   for (const DepthView::Seen& s : search.depth.seen()) {
     const Eigen::Vector2d pixel = pixel_of(s);
@@ -103,11 +103,11 @@ void add_plain(const Search& search, int block, std::span<const Track> tracks, s
 }  // namespace
 
 std::vector<NewPoint> new_points(const VoxelMap& map, const Camera& camera, const SE3& T_CW, const GreyImage& image, const DepthView& depth,
-                                 std::span<const Track> tracks, const VisionConfig& config) {
+                                 std::span<const PatchCandidate> tracks, const VisionConfig& config) {
   const CellGrid grid(camera, config.cell);
   const Search search{map, camera, image, depth, T_CW.inverse()};
   std::vector<bool> taken(grid.size(), false);
-  for (const Track& t : tracks) taken[grid.of(t.pixel)] = true;
+  for (const PatchCandidate& t : tracks) taken[grid.of(t.pixel)] = true;
   std::vector<NewPoint> best(grid.size());
   for (const DepthView::Seen& s : depth.seen()) {
     const Eigen::Vector2d pixel = pixel_of(s);
@@ -120,7 +120,7 @@ std::vector<NewPoint> new_points(const VoxelMap& map, const Camera& camera, cons
   }
   std::erase_if(best, [](const NewPoint& p) { return p.point.corner <= 0; });
   constexpr int columns = 5;  // of blocks
-  const auto corners = static_cast<std::size_t>(std::ranges::count_if(tracks, [](const Track& t) { return !t.plain; }));
+  const auto corners = static_cast<std::size_t>(std::ranges::count_if(tracks, [](const PatchCandidate& t) { return !t.plain; }));
   if (corners + best.size() < plenty_of_corners) add_plain(search, camera.width() / columns, tracks, best);
   return best;
 }

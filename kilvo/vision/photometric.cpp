@@ -48,7 +48,7 @@ std::optional<PatchView> view_of(const Camera& camera, const SE3& T_CI, const SE
 }
 
 PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, const SE3& T_CI, std::span<const GreyImage> pyramid,
-                                   std::span<const Track> tracks, const Estimate& prior, const VisionConfig& config)
+                                   std::span<const PatchCandidate> tracks, const Estimate& prior, const VisionConfig& config)
     : map_(map),
       camera_(camera),
       T_CI_(T_CI),
@@ -58,7 +58,7 @@ PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, c
       prepared_(tracks.size()),
       verdicts_(tracks.size()) {
   std::map<std::uint32_t, int> patches_of_node;
-  for (const Track& t : tracks) ++patches_of_node[map.point(t.point).node];
+  for (const PatchCandidate& t : tracks) ++patches_of_node[map.point(t.point).node];
   const PoseCovariance P = prior.P.topLeftCorner<6, 6>();
   std::vector<double> spread2;
   for (std::size_t i = 0; i < tracks.size(); ++i) {

@@ -15,7 +15,7 @@
 #include "kilvo/vision/camera.hpp"
 #include "kilvo/vision/patch_sums.hpp"
 #include "kilvo/vision/patches.hpp"
-#include "kilvo/vision/select_tracks.hpp"
+#include "kilvo/vision/select_patches.hpp"
 #include "kilvo/vision/vision_config.hpp"
 
 namespace kilvo {
@@ -45,7 +45,7 @@ class PhotometricModel {
   /// Keeps references: the map, the camera, the pyramid and the tracks must outlive it. `prior`: of the pose before the image; it says how
   /// coarsely to begin.
   PhotometricModel(const VisualMap& map, const Camera& camera, const SE3& T_CI, std::span<const GreyImage> pyramid,
-                   std::span<const Track> tracks, const Estimate& prior, const VisionConfig& config);
+                   std::span<const PatchCandidate> tracks, const Estimate& prior, const VisionConfig& config);
 
   Information<7> operator()(const State& x, const Covariance& prior);
 
@@ -111,7 +111,7 @@ class PhotometricModel {
   const Camera& camera_;
   SE3 T_CI_;
   std::span<const GreyImage> pyramid_;
-  std::span<const Track> tracks_;
+  std::span<const PatchCandidate> tracks_;
   VisionConfig config_;
   std::vector<int> schedule_;
   std::size_t call_ = 0;

@@ -58,7 +58,7 @@ class Photometric : public testing::Test {
     const SE3 T_CW = T_CI_ * prior.x.pose().inverse();
     const auto points_W = scene_.points();
     const DepthView depth(camera_, T_CW, points_W);
-    tracks_ = select_tracks(map_, camera_, T_CW, depth, config_);
+    tracks_ = select_patches(map_, camera_, T_CW, depth, config_);
     PhotometricModel model(map_, camera_, T_CI_, pyramid, tracks_, prior, config_);
     prior.P(at::tau, at::tau) = 0.01;
     if (const auto exposure = model.exposure_at(prior.x)) {
@@ -84,7 +84,7 @@ class Photometric : public testing::Test {
   VisionConfig config_;
   VoxelMap surfaces_;
   VisualMap map_;
-  std::vector<Track> tracks_;
+  std::vector<PatchCandidate> tracks_;
   PhotometricModel::Report report_;
 };
 
@@ -234,11 +234,11 @@ TEST_F(Photometric, WhatStandsInFrontHidesWhatIsBehind) {
     for (float z = -0.7F; z < 0.7F; z += 0.02F) points_W.emplace_back(1.5F, y / 2, z / 2, 10.0F);
   }
   const DepthView depth(camera_, T_CI_, points_W);
-  const auto all = select_tracks(map_, camera_, T_CI_, DepthView(camera_, T_CI_, scene_.points()), config_);
-  const auto some = select_tracks(map_, camera_, T_CI_, depth, config_);
+  const auto all = select_patches(map_, camera_, T_CI_, DepthView(camera_, T_CI_, scene_.points()), config_);
+  const auto some = select_patches(map_, camera_, T_CI_, depth, config_);
   EXPECT_LT(some.size(), all.size() * 4 / 5);
   EXPECT_GT(some.size(), all.size() / 4);
-  for (const Track& t : some) {
+  for (const PatchCandidate& t : some) {
     const Eigen::Vector3d& p = map_.point(t.point).p_W;
     const double y_at_screen = p.y() / 2 + 0.01, z_at_screen = p.z() / 2;
     EXPECT_FALSE(y_at_screen > -0.45 && y_at_screen < -0.05 && std::abs(z_at_screen) < 0.3) << p.transpose();

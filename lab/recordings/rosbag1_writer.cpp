@@ -83,7 +83,7 @@ Rosbag1Writer::~Rosbag1Writer() {
   try {
     close();
   } catch (const OutputError&) {
-    // Told to those who call close().
+    // SweepNoiseCorrelation to those who call close().
   }
 }
 

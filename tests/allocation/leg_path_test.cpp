@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "kilvo/estimator/estimator.hpp"
-#include "kilvo/estimator/forerunner.hpp"
+#include "kilvo/estimator/live_propagator.hpp"
 #include "lab/settings/settings.hpp"
 #include "lab/simulation/description.hpp"
 #include "lab/simulation/simulator.hpp"
@@ -88,11 +88,11 @@ TEST(LegPath, TakesNoMemoryOnceItIsWarm) {
   EXPECT_EQ(std::exchange(allocations, 0), 0) << "in " << samples << " leg samples";
 }
 
-TEST(Forerunner, TakesNoMemoryOnceItIsWarm) {
+TEST(LivePropagator, TakesNoMemoryOnceItIsWarm) {
   LegWalk walk(9);
   Estimator estimator(walk.settings.robot, walk.settings.estimator, walk.config.use);
   LegKinematics kinematics(walk.settings.robot);
-  Forerunner runner(walk.settings.robot, walk.settings.estimator);
+  LivePropagator runner(walk.settings.robot, walk.settings.estimator);
   long outputs = 0;
   bool warm = false;
   std::optional<Time> forked;

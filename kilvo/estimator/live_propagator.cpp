@@ -1,21 +1,21 @@
-#include "kilvo/estimator/forerunner.hpp"
+#include "kilvo/estimator/live_propagator.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "kilvo/estimator/fault.hpp"
-#include "kilvo/estimator/footfall.hpp"
+#include "kilvo/estimator/leg_update.hpp"
 #include "kilvo/estimator/recovery.hpp"
 #include "kilvo/estimator/silence.hpp"
 #include "kilvo/estimator/stopwatch.hpp"
 
 namespace kilvo {
 
-Forerunner::Forerunner(const Robot& robot, const EstimatorConfig& config)
+LivePropagator::LivePropagator(const Robot& robot, const EstimatorConfig& config)
     : leg_rate_(robot.legs.rate), imu_rate_(robot.imu.rate), replay_(config), contacts_(config.legs), stances_(config.legs) {}
 
 // Both ends of the IMU's intervals up to the newest sample that is not after `until` are known now.
-void Forerunner::close(Time until) {
+void LivePropagator::close(Time until) {
   const Time newest = replay_.newest_imu_by(until);
   if (newest <= closed_.t) return;
   replay_.close(closed_, now_, newest, nullptr);
@@ -26,7 +26,7 @@ void Forerunner::close(Time until) {
 }
 
 // The estimator will say so as well, once it has stopped waiting for them.
-void Forerunner::miss_legs() {
+void LivePropagator::miss_legs() {
   last_legs_.reset();
   if (!has_legs(modality_)) return;
   modality_ = without_legs(modality_);
@@ -34,12 +34,12 @@ void Forerunner::miss_legs() {
 }
 
 // What is not finite goes nowhere: it is silent until the estimator, which throws such a state away, is forked again.
-bool Forerunner::keep_finite() {
+bool LivePropagator::keep_finite() {
   started_ = is_finite(now_);
   return started_;
 }
 
-bool Forerunner::push(const ImuSample& raw) {
+bool LivePropagator::push(const ImuSample& raw) {
   if (!started_ || imu_lost_ || fault_of(raw) != nullptr) return false;
   const Time newest = replay_.newest_imu().t;
   // Whether its clock has jumped or the IMU was silent is for the estimator to find out.
@@ -54,7 +54,7 @@ bool Forerunner::push(const ImuSample& raw) {
   return keep_finite();
 }
 
-bool Forerunner::push(const Feet& feet) {
+bool LivePropagator::push(const Feet& feet) {
   if (!started_ || imu_lost_) return false;
   if (!last_legs_ || feet.t <= *last_legs_ || feet.t < closed_.t) return false;
   if (to_seconds(feet.t - replay_.newest_imu().t) > longest_held_imu(imu_rate_)) return false;
@@ -69,17 +69,17 @@ bool Forerunner::push(const Feet& feet) {
   last_legs_ = feet.t;
   replay_.predict_to(now_, feet.t, nullptr);
   // Without the map: it is the estimator's, and grows. What the ground tells is told by the next fork.
-  contact_us_ = take_step(feet, now_, contacts_, stances_, replay_, nullptr, StanceTracker::Ground::learn).contact_us;
+  contact_us_ = update_by_legs(feet, now_, contacts_, stances_, replay_, nullptr, StanceTracker::Ground::learn).contact_us;
   if (feet.t == closed_.t) closed_ = now_;
   with_legs_ = true;
   kinematic_us_ = watch.lap_us();
   return keep_finite();
 }
 
-Output Forerunner::output() const {
+Output LivePropagator::output() const {
   Output o;
   Estimate e = now_;
-  if (imu_lost_) widen(e, e.t, e.t + from_seconds(blind_gap), blind_gap);
+  if (imu_lost_) inflate_covariance_over_gap(e, e.t, e.t + from_seconds(blind_gap), blind_gap);
   o.t = e.t;
   o.x = e.x;
   o.P = e.P;

@@ -1,4 +1,4 @@
-"""Holds the documents to the tree: links lead somewhere, what stands in backticks exists, every room is on the page of the house.
+"""Holds the documents to the tree: links lead somewhere, what stands in backticks exists, every module is named in docs/architecture.md.
 
 In docs/architecture.md and docs/notation.md a word in backticks must be a file or folder of the project or a word of its sources
 (`kilvo::x`, `x.y`, `f(a)` and the like are taken apart; `_W` and the like are endings of names)."""
@@ -52,11 +52,11 @@ def check(root: str) -> list[str]:
                         faults.append(f"{name}:{number}: there is no {word} (`{code}`)")
 
     with open(os.path.join(root, "docs/architecture.md"), encoding="utf-8") as file:
-        house = file.read()
-    with open(os.path.join(root, "rooms.txt"), encoding="utf-8") as file:
-        for room in re.findall(r"^(?!reserve|test-only)([\w/]+):", file.read(), re.M):
-            if not re.search(rf"(?<!\w){room.split('/')[-1]}/", house):
-                faults.append(f"docs/architecture.md: the room {room} is not on the page")
+        page = file.read()
+    with open(os.path.join(root, "modules.txt"), encoding="utf-8") as file:
+        for module in re.findall(r"^(?!reserve|test-only)([\w/]+):", file.read(), re.M):
+            if not re.search(rf"(?<!\w){module.split('/')[-1]}/", page):
+                faults.append(f"docs/architecture.md: the module {module} is not on the page")
     return faults
 
 

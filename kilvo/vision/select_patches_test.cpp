@@ -1,4 +1,4 @@
-#include "kilvo/vision/select_tracks.hpp"
+#include "kilvo/vision/select_patches.hpp"
 
 #include <gtest/gtest.h>
 

@@ -11,14 +11,14 @@
 namespace kilvo {
 
 /// What a leg sample did.
-struct Footfall {
+struct LegUpdate {
   LegStep step;
   std::array<bool, 2> passed = {false, false};  // the feet whose rows were used
   double contact_us = 0;                        // the contacts' part of the time
 };
 
 /// `e`: predicted to feet.t. `replay`: holds the IMU samples, and gets the step. `map`: on whose planes the feet stand, if any.
-Footfall take_step(const Feet& feet, Estimate& e, ContactEstimator& contacts, StanceTracker& stances, Replay& replay, const VoxelMap* map,
-                   StanceTracker::Ground ground);
+LegUpdate update_by_legs(const Feet& feet, Estimate& e, ContactEstimator& contacts, StanceTracker& stances, Replay& replay,
+                         const VoxelMap* map, StanceTracker::Ground ground);
 
 }  // namespace kilvo

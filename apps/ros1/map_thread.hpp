@@ -15,12 +15,12 @@
 
 namespace kilvo::ros1 {
 
-class MapRoom {
+class MapThread {
  public:
-  MapRoom(const Names& names, const lab::MappingConfig& config);
-  ~MapRoom();
-  MapRoom(const MapRoom&) = delete;
-  MapRoom& operator=(const MapRoom&) = delete;
+  MapThread(const Names& names, const lab::MappingConfig& config);
+  ~MapThread();
+  MapThread(const MapThread&) = delete;
+  MapThread& operator=(const MapThread&) = delete;
 
   /// An output of a sweep or an image. Never waits; the oldest are given up when too many wait.
   void take(Output output);

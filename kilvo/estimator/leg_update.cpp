@@ -1,4 +1,4 @@
-#include "kilvo/estimator/footfall.hpp"
+#include "kilvo/estimator/leg_update.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 
 namespace kilvo {
 
-Footfall take_step(const Feet& feet, Estimate& e, ContactEstimator& contacts, StanceTracker& stances, Replay& replay, const VoxelMap* map,
-                   StanceTracker::Ground ground) {
-  Footfall out;
+LegUpdate update_by_legs(const Feet& feet, Estimate& e, ContactEstimator& contacts, StanceTracker& stances, Replay& replay,
+                         const VoxelMap* map, StanceTracker::Ground ground) {
+  LegUpdate out;
   const State& x = e.x;
   const Eigen::Vector3d omega = replay.newest_imu().gyro - x.bg;
   const double sigma_v = std::sqrt(std::max(0.0, e.P.block<3, 3>(at::v, at::v).trace() / 3));

@@ -1,4 +1,4 @@
-"""tests/house/documents.py on a small tree, with one untruth in each document."""
+"""tests/project/documents.py on a small tree, with one untruth in each document."""
 import os
 import subprocess
 import sys
@@ -8,7 +8,7 @@ import unittest
 HERE = os.path.dirname(os.path.abspath(__file__))
 
 TREE = {
-    "rooms.txt": "kilvo/math:\nreserve <x: kilvo/math\n",
+    "modules.txt": "kilvo/math:\nreserve <x: kilvo/math\n",
     "kilvo/math/so3.hpp": "struct SO3 { int Exp(int p_W); };\n",
     "docs/architecture.md": "`kilvo/math` holds `SO3::Exp`, see [notation](notation.md).\n```text\nmath/ `Nonsense`\n```\n",
     "docs/notation.md": "`_W` is the world: `x.Exp(p_W)`.\n",
@@ -37,7 +37,7 @@ class Documents(unittest.TestCase):
         self.assertIn("docs/decisions/a.md:1: ../b.md does not exist", self.faults_of({"docs/decisions/a.md": "[b](../b.md)\n"}))
 
     def test_a_room_that_is_not_on_the_page(self):
-        self.assertIn("the room kilvo/map is not on the page", self.faults_of({"rooms.txt": TREE["rooms.txt"] + "kilvo/map: kilvo/math\n"}))
+        self.assertIn("the module kilvo/map is not on the page", self.faults_of({"modules.txt": TREE["modules.txt"] + "kilvo/map: kilvo/math\n"}))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-#include "apps/cli/recap.hpp"
+#include "apps/cli/run_summary.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -41,7 +41,7 @@ double StageClock::total() const {
   return sum;
 }
 
-void Recap::add(const Output& output) {
+void RunSummary::add(const Output& output) {
   const StampedState now{output.t, output.x.pose()};
   if (!first_) first_ = last_on_path_ = now;
   if (last_) modality_seconds_[name_of(output.modality)] += to_seconds(output.t - last_->t);
@@ -56,12 +56,12 @@ void Recap::add(const Output& output) {
   judge(output);
 }
 
-void Recap::count_touchdowns(const Contacts& contacts) {
+void RunSummary::count_touchdowns(const Contacts& contacts) {
   for (std::size_t side = 0; side < 2; ++side) contact_events_[side] += contacts.on[side] && !on_[side] ? 1 : 0;
   on_ = contacts.on;
 }
 
-void Recap::judge(const Output& output) {
+void RunSummary::judge(const Output& output) {
   if (!absurdity_.empty()) return;
   const double after = to_seconds(output.t - first_->t);
   if (!output.x.p.allFinite() || !output.x.R.matrix().allFinite() || !output.x.v.allFinite()) {

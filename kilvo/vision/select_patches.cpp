@@ -1,4 +1,4 @@
-#include "kilvo/vision/select_tracks.hpp"
+#include "kilvo/vision/select_patches.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -42,7 +42,7 @@ struct View {
 };
 
 // The observation whose view is most like this one; of those that are alike, the oldest, which has drifted least.
-bool choose_observation(const View& view, const VisualPoint& p, Track& track) {
+bool choose_observation(const View& view, const VisualPoint& p, PatchCandidate& track) {
   constexpr double alike_scale = 0.25, alike_angle = 0.2;  // octaves, rad
   const Eigen::Vector3d towards = view.eye_W - p.p_W;
   const double distance = towards.norm();
@@ -95,13 +95,13 @@ std::optional<PlaneWarp> warp_between(const Camera& camera, const SE3& T_CW, con
   return out;
 }
 
-std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,
-                                 const VisionConfig& config) {
+std::vector<PatchCandidate> select_patches(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,
+                                           const VisionConfig& config) {
   const View view{map, camera, T_CW, T_CW.inverse().p};
   const CellGrid grid(camera, config.cell);
   struct Best {
     double worth = 0;
-    Track track;
+    PatchCandidate track;
   };
   std::vector<Best> cells(grid.size());
   for (const VoxelKey key : voxels_in_view(map, depth)) {
@@ -119,19 +119,19 @@ std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, con
       if (std::abs(facing) < grazing * towards.norm()) return;
       if (depth.hides(*pixel, p.p_W, facing > 0 ? n : Eigen::Vector3d(-n), p_C.z())) return;
       // A point without a usable view would keep others out of its cell for ever.
-      Track track;
+      PatchCandidate track;
       track.point = id;
       track.plain = static_cast<double>(p.corner) < config.min_corner;
       track.pixel = *pixel;
       if (choose_observation(view, p, track)) best = {worth, track};
     });
   }
-  std::vector<Track> tracks;
+  std::vector<PatchCandidate> tracks;
   for (const Best& best : cells) {
     if (best.worth > 0) tracks.push_back(best.track);
   }
-  const std::size_t corners = tracks.size() - static_cast<std::size_t>(std::ranges::count_if(tracks, &Track::plain));
-  if (corners >= plenty_of_corners) std::erase_if(tracks, [](const Track& t) { return t.plain; });
+  const std::size_t corners = tracks.size() - static_cast<std::size_t>(std::ranges::count_if(tracks, &PatchCandidate::plain));
+  if (corners >= plenty_of_corners) std::erase_if(tracks, [](const PatchCandidate& t) { return t.plain; });
   return tracks;
 }
 

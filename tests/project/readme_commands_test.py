@@ -1,4 +1,4 @@
-"""tests/house/readme_commands.py on small READMEs, each with one untruth in it, and a stand-in for the program."""
+"""tests/project/readme_commands.py on small READMEs, each with one untruth in it, and a stand-in for the program."""
 import os
 import shutil
 import subprocess

@@ -11,6 +11,6 @@ namespace kilvo::cli {
 std::vector<std::string> with_values(std::vector<std::string> words);
 
 /// Throws UsageError at the first word that is no verb or no option of its verb.
-void check_words(const std::vector<std::string>& words, const CLI::App& program);
+void check_arguments(const std::vector<std::string>& words, const CLI::App& program);
 
 }  // namespace kilvo::cli

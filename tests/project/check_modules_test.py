@@ -1,14 +1,14 @@
-"""Each rule of scripts/check_rooms, broken once: the message must name the file, the line and the rule."""
+"""Each rule of scripts/check_modules, broken once: the message must name the file, the line and the rule."""
 import unittest
 
-from planted_tree import ROOMS, PlantedTree
+from planted_tree import MODULES, PlantedTree
 
 MATH = "kilvo/math/new.hpp"
 HEADER = "#pragma once\n"
 
 
 class CheckRooms(PlantedTree):
-    script = "check_rooms"
+    script = "check_modules"
 
     def test_a_clean_house_passes(self):
         self.assert_clean({})
@@ -16,12 +16,12 @@ class CheckRooms(PlantedTree):
     def test_forbidden_include(self):
         self.assert_found({MATH: HEADER + '#include "kilvo/map/map.hpp"\n'},
                           "kilvo/math/new.hpp:2: kilvo/math must not include kilvo/map/map.hpp",
-                          "cycle among rooms: kilvo/map -> kilvo/math -> kilvo/map")
+                          "cycle among modules: kilvo/map -> kilvo/math -> kilvo/map")
 
     def test_forbidden_include_written_in_angle_brackets(self):
         self.assert_found({"kilvo/map/new.cpp": "#include <lab/settings/load.hpp>\n"},
                           "kilvo/map/new.cpp:1: kilvo/map must not include",
-                          "cycle among rooms")
+                          "cycle among modules")
 
     def test_an_include_in_a_comment_or_string_is_none(self):
         self.assert_clean({MATH: HEADER + '// #include <iostream>\n/*\n#include "lab/settings/load.hpp"\n*/\n'})
@@ -35,30 +35,30 @@ class CheckRooms(PlantedTree):
 
     def test_undeclared_room(self):
         self.assert_found({"kilvo/attic/box.cpp": "\n", "kilvo/attic/trunk.cpp": "\n"},
-                          "kilvo/attic/box.cpp:1: kilvo/attic is an undeclared room")
+                          "kilvo/attic/box.cpp:1: kilvo/attic is an undeclared module")
 
     def test_undeclared_folder_inside_a_room(self):
-        self.assert_found({"kilvo/math/detail/box.cpp": "\n"}, "kilvo/math/detail is an undeclared room")
+        self.assert_found({"kilvo/math/detail/box.cpp": "\n"}, "kilvo/math/detail is an undeclared module")
 
     def test_a_room_that_rooms_txt_only_mentions(self):
-        self.assert_found({"rooms.txt": ROOMS + "bench: kilvo/maths\n"}, "rooms.txt:10: bench names kilvo/maths, which is no room")
+        self.assert_found({"modules.txt": MODULES + "bench: kilvo/maths\n"}, "modules.txt:10: bench names kilvo/maths, which is no module")
 
     def test_a_line_of_rooms_txt_that_says_nothing(self):
-        self.assert_found({"rooms.txt": ROOMS + "let me in\n"}, "rooms.txt:10: not understood: let me in")
+        self.assert_found({"modules.txt": MODULES + "let me in\n"}, "modules.txt:10: not understood: let me in")
 
     def test_a_room_listed_twice(self):
-        self.assert_found({"rooms.txt": ROOMS + "kilvo/map: kilvo/math\n"}, "rooms.txt:10: kilvo/map is listed twice")
+        self.assert_found({"modules.txt": MODULES + "kilvo/map: kilvo/math\n"}, "modules.txt:10: kilvo/map is listed twice")
 
     def test_reserved_header_in_another_room(self):
         self.assert_found({"kilvo/map/new.cpp": "#include <yaml-cpp/yaml.h>\n"},
-                          "kilvo/map/new.cpp:1: <yaml-cpp/yaml.h> is reserved for lab/settings (rooms.txt:7)")
+                          "kilvo/map/new.cpp:1: <yaml-cpp/yaml.h> is reserved for lab/settings (modules.txt:7)")
 
     def test_header_reserved_for_one_file_in_another_file_of_the_room(self):
         self.assert_found({MATH: HEADER + "#include <tbb/parallel_for.h>\n"}, "<tbb/parallel_for.h> is reserved for kilvo/math/sum.hpp")
 
     def test_cycle_in_the_rules(self):
-        self.assert_found({"rooms.txt": ROOMS.replace("kilvo/math:", "kilvo/math: kilvo/map")},
-                          "cycle among rooms: kilvo/map -> kilvo/math -> kilvo/map")
+        self.assert_found({"modules.txt": MODULES.replace("kilvo/math:", "kilvo/math: kilvo/map")},
+                          "cycle among modules: kilvo/map -> kilvo/math -> kilvo/map")
 
     def test_using_namespace_in_a_header(self):
         self.assert_found({MATH: HEADER + "using namespace std;\n"}, "kilvo/math/new.hpp:2: no `using namespace` in headers")
@@ -108,12 +108,12 @@ class CheckRooms(PlantedTree):
         self.assert_found({"kilvo/map/map_test.cpp": "#include <fstream>\n"}, "kilvo/map/map_test.cpp:1: <fstream> has no place")
 
     def test_a_unit_test_may_include_what_a_test_only_line_says(self):
-        rooms = ROOMS + "test-only kilvo/map: lab/settings <fstream> <yaml-cpp/\n"
+        modules = MODULES + "test-only kilvo/map: lab/settings <fstream> <yaml-cpp/\n"
         include = '#include <fstream>\n#include <yaml-cpp/yaml.h>\n#include "lab/settings/load.hpp"\n'
-        self.assert_clean({"rooms.txt": rooms, "kilvo/map/map_test.cpp": include, "kilvo/map/map_fuzz.cpp": include})
-        self.assert_found({"rooms.txt": rooms, "kilvo/map/new.cpp": include},
+        self.assert_clean({"modules.txt": modules, "kilvo/map/map_test.cpp": include, "kilvo/map/map_fuzz.cpp": include})
+        self.assert_found({"modules.txt": modules, "kilvo/map/new.cpp": include},
                           "new.cpp:1: <fstream>", "new.cpp:2: <yaml-cpp/yaml.h>", "new.cpp:3: kilvo/map must not include",
-                          "cycle among rooms")
+                          "cycle among modules")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@
 
 namespace kilvo {
 
-struct Track {
+struct PatchCandidate {
   std::uint32_t point = 0;
   std::uint32_t observation = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // where it is expected
@@ -43,8 +43,8 @@ inline constexpr std::size_t enough_corners = 8;
 inline constexpr std::size_t plenty_of_corners = 24;
 
 /// What the camera at T_CW should see of the map.
-std::vector<Track> select_tracks(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,
-                                 const VisionConfig& config);
+std::vector<PatchCandidate> select_patches(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,
+                                           const VisionConfig& config);
 
 /// How the plane through p_W with normal n_W maps from the image at T_CW to that at T_RW, about the point. None where either does not see
 /// it.

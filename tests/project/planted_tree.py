@@ -8,7 +8,7 @@ import unittest
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 SCRIPTS = os.path.join(ROOT, "scripts")
 
-ROOMS = """# a house of five rooms
+MODULES = """# a tree of five modules
 kilvo/math:
 kilvo/map: kilvo/math
 lab/settings: kilvo/*
@@ -20,7 +20,7 @@ reserve <iostream>: lab apps tests
 """
 
 CLEAN = {
-    "rooms.txt": ROOMS,
+    "modules.txt": MODULES,
     "kilvo/math/sum.hpp": '#pragma once\n#include <tbb/parallel_for.h>\nnamespace kilvo {\nint sum(int a, int b);\n}\n',
     "kilvo/math/sum.cpp": '#include "kilvo/math/sum.hpp"\nnamespace kilvo {\nint sum(int a, int b) { return a + b; }\n}\n',
     "kilvo/math/sum_test.cpp": '#include <gtest/gtest.h>\n#include "kilvo/math/sum.hpp"\nTEST(Sum, Adds) {}\n',

@@ -1,8 +1,8 @@
-# kilvo_room(NAME [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
+# kilvo_module(NAME [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
 #
-# One folder is one room is one CMake target, `kilvo_NAME` (alias `kilvo::NAME`): every *.cpp is compiled, every *.hpp is in
+# One folder is one module is one CMake target, `kilvo_NAME` (alias `kilvo::NAME`): every *.cpp is compiled, every *.hpp is in
 # the header set (and, verified, compiles alone), every *_test.cpp beside it goes into one test program `kilvo_NAME_test`.
-# What a room may include is said in rooms.txt and checked by scripts/check_rooms.
+# What a module may include is said in modules.txt and checked by scripts/check_modules.
 
 add_library(kilvo_flags INTERFACE)
 target_compile_options(kilvo_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -fno-math-errno -fno-trapping-math
@@ -18,8 +18,8 @@ function(kilvo_wide)
   set_source_files_properties(${ARGN} PROPERTIES COMPILE_DEFINITIONS "KILVO_WIDE=${KILVO_WIDE}")
 endfunction()
 
-function(kilvo_room name)
-  cmake_parse_arguments(ROOM "" "" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
+function(kilvo_module name)
+  cmake_parse_arguments(MODULE "" "" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   file(GLOB tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp)
   file(GLOB fuzzers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_fuzz.cpp)
@@ -35,7 +35,7 @@ function(kilvo_room name)
   if(sources)
     add_library(${target} STATIC ${sources})
     set(scope PUBLIC)
-    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:kilvo_flags> ${ROOM_PRIVATE})
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:kilvo_flags> ${MODULE_PRIVATE})
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
@@ -44,11 +44,11 @@ function(kilvo_room name)
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON)
   target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${headers})
   target_compile_features(${target} ${scope} cxx_std_20)
-  target_link_libraries(${target} ${scope} ${ROOM_DEPENDS})
+  target_link_libraries(${target} ${scope} ${MODULE_DEPENDS})
 
   if(tests AND BUILD_TESTING)
     add_executable(${target}_test ${tests})
-    target_link_libraries(${target}_test PRIVATE ${target} kilvo_flags ${ROOM_PRIVATE} ${ROOM_TEST_DEPENDS} GTest::gmock GTest::gtest_main)
+    target_link_libraries(${target}_test PRIVATE ${target} kilvo_flags ${MODULE_PRIVATE} ${MODULE_TEST_DEPENDS} GTest::gmock GTest::gtest_main)
     target_compile_definitions(${target}_test PRIVATE KILVO_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
     gtest_discover_tests(${target}_test TEST_PREFIX ${name}/ DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
   endif()
@@ -58,7 +58,7 @@ function(kilvo_room name)
       add_executable(${fuzz_name} ${fuzzer})
       target_compile_options(${fuzz_name} PRIVATE -fsanitize=fuzzer)
       target_link_options(${fuzz_name} PRIVATE -fsanitize=fuzzer)
-      target_link_libraries(${fuzz_name} PRIVATE ${target} ${ROOM_PRIVATE})
+      target_link_libraries(${fuzz_name} PRIVATE ${target} ${MODULE_PRIVATE})
     endforeach()
   endif()
 endfunction()

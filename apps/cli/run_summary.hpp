@@ -35,7 +35,7 @@ struct StampedState {
   SE3 T_WI;
 };
 
-class Recap {
+class RunSummary {
  public:
   void add(const Output& output);
   void count_sweep() { ++sweeps_; }

@@ -14,9 +14,9 @@
 
 namespace kilvo {
 
-class Forerunner {
+class LivePropagator {
  public:
-  Forerunner(const Robot& robot, const EstimatorConfig& config);
+  LivePropagator(const Robot& robot, const EstimatorConfig& config);
 
   /// Each takes a measurement in the order of its arrival and says whether there is a new output. One that it knows already, that is late,
   /// or that is too far ahead to be believed is ignored: the estimator sees it as well. Neither allocates, once warm.

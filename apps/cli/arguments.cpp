@@ -1,4 +1,4 @@
-#include "apps/cli/words.hpp"
+#include "apps/cli/arguments.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -48,7 +48,7 @@ std::vector<std::string> with_values(std::vector<std::string> words) {
   return words;
 }
 
-void check_words(const std::vector<std::string>& words, const CLI::App& program) {
+void check_arguments(const std::vector<std::string>& words, const CLI::App& program) {
   const CLI::App* app = &program;
   for (const std::string& word : words) {
     if (word == "--") return;

@@ -1,4 +1,4 @@
-#include "apps/ros1/map_room.hpp"
+#include "apps/ros1/map_thread.hpp"
 
 #include <ros/names.h>
 
@@ -13,14 +13,14 @@ constexpr std::uint32_t most_unsent = 4;  // clouds
 
 }  // namespace
 
-MapRoom::MapRoom(const Names& names, const lab::MappingConfig& config) : config_(config), frame_(names.map_frame), map_(config) {
+MapThread::MapThread(const Names& names, const lab::MappingConfig& config) : config_(config), frame_(names.map_frame), map_(config) {
   ros::NodeHandle node;
   cloud_ = node.advertise<CloudMessage>(ros::names::resolve(names.cloud), most_unsent);
   coloured_ = node.advertise<CloudMessage>(ros::names::resolve(names.coloured), most_unsent);
   thread_ = std::thread([this] { run(); });
 }
 
-MapRoom::~MapRoom() {
+MapThread::~MapThread() {
   {
     const std::lock_guard lock(waiting_mutex_);
     ended_ = true;
@@ -29,7 +29,7 @@ MapRoom::~MapRoom() {
   thread_.join();
 }
 
-void MapRoom::take(Output output) {
+void MapThread::take(Output output) {
   {
     const std::lock_guard lock(waiting_mutex_);
     if (waiting_.size() >= most_waiting) {
@@ -41,7 +41,7 @@ void MapRoom::take(Output output) {
   news_.notify_one();
 }
 
-void MapRoom::run() {
+void MapThread::run() {
   std::unique_lock lock(waiting_mutex_);
   while (true) {
     news_.wait(lock, [this] { return ended_ || !waiting_.empty(); });
@@ -54,7 +54,7 @@ void MapRoom::run() {
   }
 }
 
-void MapRoom::put(const Output& output) {
+void MapThread::put(const Output& output) {
   if (output.is_sweep && cloud_.getNumSubscribers() > 0) cloud_.publish(cloud_message(output.points_W, output.t, frame_));
   if (!output.coloured.empty() && coloured_.getNumSubscribers() > 0) coloured_.publish(cloud_message(output.coloured, output.t, frame_));
   const std::lock_guard lock(map_mutex_);
@@ -62,13 +62,13 @@ void MapRoom::put(const Output& output) {
   if (!output.coloured.empty()) map_.colour(output.coloured);
 }
 
-std::size_t MapRoom::save(const std::string& path) {
+std::size_t MapThread::save(const std::string& path) {
   const std::lock_guard lock(map_mutex_);
   lab::write_ply(path, map_);
   return map_.size();
 }
 
-void MapRoom::clear() {
+void MapThread::clear() {
   {
     const std::lock_guard lock(waiting_mutex_);
     waiting_.clear();
@@ -77,7 +77,7 @@ void MapRoom::clear() {
   map_ = lab::MapBuilder(config_);
 }
 
-std::uint64_t MapRoom::given_up() const {
+std::uint64_t MapThread::given_up() const {
   const std::lock_guard lock(waiting_mutex_);
   return given_up_;
 }
