@@ -2,141 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <console_bridge/console.h>
-#include <kdl/tree.hpp>
 #include <limits>
 #include <optional>
 #include <stdexcept>
-#include <urdf_parser/urdf_parser.h>
+
+#include "kilvo/legs/joint_chain.hpp"
 
 namespace kilvo {
 namespace {
 
 // Corners this much higher than the lowest weigh e times less, m.
 constexpr double softness = 0.001;
-
-KDL::Vector to_kdl(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
-KDL::Frame to_kdl(const urdf::Pose& p) {
-  return {KDL::Rotation::Quaternion(p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w), to_kdl(p.position)};
-}
-Eigen::Vector3d to_eigen(const KDL::Vector& v) { return {v.x(), v.y(), v.z()}; }
-Eigen::Matrix3d to_eigen(const KDL::Rotation& R) { return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(R.data); }
-
-KDL::Joint to_kdl(const urdf::Joint& joint, bool locked) {
-  const auto fault = [&joint](const char* what) { return std::invalid_argument("robot.urdf: joint " + joint.name + what); };
-  const KDL::Frame origin = to_kdl(joint.parent_to_joint_origin_transform);
-  const KDL::Vector axis = origin.M * to_kdl(joint.axis);
-  constexpr double absurd_length = 100;  // m
-  if (!(origin.p.Norm() < absurd_length)) throw fault(": origin is over 100 m away");
-  if (locked || joint.type == urdf::Joint::FIXED) return KDL::Joint(joint.name, KDL::Joint::Fixed);
-  if (!(axis.Norm() > 1e-6)) throw fault(": axis has no length");
-  if (joint.type == urdf::Joint::PRISMATIC) return {joint.name, origin.p, axis, KDL::Joint::TransAxis};
-  if (joint.type != urdf::Joint::REVOLUTE && joint.type != urdf::Joint::CONTINUOUS)
-    throw fault(" is neither revolute, prismatic nor fixed");
-  return {joint.name, origin.p, axis, KDL::Joint::RotAxis};
-}
-
-void add_children(const urdf::Link& link, const Robot& robot, KDL::Tree& tree) {
-  for (const auto& child : link.child_links) {
-    const urdf::Joint& joint = *child->parent_joint;
-    const bool locked = std::ranges::find(robot.locked_joints, joint.name) != robot.locked_joints.end();
-    const KDL::Segment segment(child->name, to_kdl(joint, locked), to_kdl(joint.parent_to_joint_origin_transform));
-    if (!tree.addSegment(segment, link.name)) throw std::invalid_argument("robot.urdf: link " + child->name + " cannot be attached");
-    add_children(*child, robot, tree);
-  }
-}
-
-// Keeps what the parser has to say, instead of letting it print, as long as this lives.
-class UrdfLog final : public console_bridge::OutputHandler {
- public:
-  UrdfLog() { console_bridge::useOutputHandler(this); }
-  ~UrdfLog() override { console_bridge::restorePreviousOutputHandler(); }
-  UrdfLog(const UrdfLog&) = delete;
-  UrdfLog& operator=(const UrdfLog&) = delete;
-  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
-    if (first_.empty() && level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) first_ = ": " + text;
-  }
-  const std::string& first() const { return first_; }
-
- private:
-  std::string first_;
-};
-
-KDL::Tree tree_of(const Robot& robot) {
-  const UrdfLog words;
-  const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(robot.urdf);
-  if (!model || !model->getRoot()) throw std::invalid_argument("robot.urdf is not a URDF document" + words.first());
-  KDL::Tree tree(model->getRoot()->name);
-  add_children(*model->getRoot(), robot, tree);
-  return tree;
-}
-
-std::string missing(const std::string& joint) { return "joint " + joint + " is neither in the message nor in robot.locked_joints"; }
-
-// A joint and the rigid parts before it, in the frame of the joint before; R: how the frame behind it is turned when it is at zero.
-struct Joint {
-  bool turns = false, slides = false;  // neither: the rigid end of the leg
-  Eigen::Vector3d axis = Eigen::Vector3d::Zero(), p = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-};
-
-// One leg: its joints from the IMU to the foot, and where in the message each of them is.
-struct Leg {
-  std::vector<Joint> joints;        // the moving ones and the end
-  std::vector<std::string> names;   // of the moving ones
-  std::vector<std::size_t> places;  // in the message, by joint
-};
-
-Leg leg_of(const KDL::Tree& tree, const std::string& imu_link, const Foot& foot) {
-  Leg leg;
-  for (const std::string& link : {imu_link, foot.link}) {
-    if (tree.getSegment(link) == tree.getSegments().end()) throw std::invalid_argument("robot.urdf has no link " + link);
-  }
-  KDL::Chain chain;
-  if (!tree.getChain(imu_link, foot.link, chain))
-    throw std::invalid_argument("robot.urdf: no way from link " + imu_link + " to link " + foot.link);
-  Joint next;
-  for (const KDL::Segment& s : chain.segments) {
-    const KDL::Frame at_zero = s.pose(0);
-    const KDL::Joint& joint = s.getJoint();
-    next.turns = joint.getType() == KDL::Joint::RotAxis;
-    next.slides = joint.getType() == KDL::Joint::TransAxis;
-    const bool moves = next.turns || next.slides;
-    // Against the tree's direction a joint is not where its segment ends: the rest of the way belongs to the next joint.
-    const Eigen::Vector3d end = to_eigen(at_zero.p), origin = moves ? to_eigen(joint.JointOrigin()) : end;
-    const Eigen::Matrix3d turned = to_eigen(at_zero.M);
-    next.p += next.R * origin;
-    next.axis = next.R * to_eigen(joint.JointAxis());
-    next.R = (next.R * turned).eval();
-    if (!moves) continue;
-    leg.names.push_back(joint.getName());
-    leg.joints.push_back(next);
-    next = Joint{};
-    next.p = turned.transpose() * (end - origin);
-  }
-  leg.joints.push_back(next);
-  return leg;
-}
-
-// A frame that moves, as its base sees it.
-struct Moving {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d p = Eigen::Vector3d::Zero(), v = Eigen::Vector3d::Zero(), omega = Eigen::Vector3d::Zero();
-};
-
-// From the frame behind one joint to that behind the next.
-void pass(const Joint& joint, double q, double dq, Moving& frame) {
-  const Eigen::Vector3d arm = frame.R * joint.p;
-  frame.p += arm;
-  frame.v += frame.omega.cross(arm);
-  const Eigen::Vector3d axis = frame.R * joint.axis;
-  if (joint.slides) {
-    frame.p += q * axis;
-    frame.v += frame.omega.cross(q * axis) + dq * axis;
-  }
-  if (joint.turns) frame.omega += dq * axis;
-  frame.R = (frame.R * (joint.turns ? Eigen::Matrix3d(SO3::Exp(q * joint.axis).matrix() * joint.R) : joint.R)).eval();
-}
 
 }  // namespace
 
@@ -145,7 +21,7 @@ struct LegKinematics::Chains {
   std::array<Foot, 2> feet;
   SE3 T_IL;  // the IMU's link in the IMU frame
   LegsMount mount;
-  std::array<Leg, 2> legs;
+  std::array<JointChain, 2> legs;
   std::vector<std::string> message_names;  // that the places are for
   // For messages without velocities.
   std::vector<double> last_position, velocity;
@@ -159,15 +35,10 @@ struct LegKinematics::Chains {
 // Where in a message of these names each joint is.
 std::optional<std::string> LegKinematics::Chains::look_up_planes(const std::vector<std::string>& names) {
   if (names == message_names) return std::nullopt;
-  for (Leg& leg : legs) {
-    leg.places.clear();
-    for (const std::string& joint : leg.names) {
-      const auto it = std::ranges::find(names, joint);
-      if (it == names.end()) {
-        message_names.clear();
-        return missing(joint);
-      }
-      leg.places.push_back(static_cast<std::size_t>(it - names.begin()));
+  for (JointChain& leg : legs) {
+    if (const auto missing = leg.look_up(names)) {
+      message_names.clear();
+      return joint_is_missing(*missing);
     }
   }
   message_names = names;
@@ -209,10 +80,7 @@ FootPose LegKinematics::Chains::pose_of(std::size_t side, const JointSample& s, 
     out.v[0] = mount.T_imu_feet.R * triple(velocity_of_all);
     return out;
   }
-  const Leg& leg = legs[side];
-  Moving foot;
-  for (std::size_t i = 0; i < leg.places.size(); ++i) pass(leg.joints[i], s.position[leg.places[i]], velocity_of_all[leg.places[i]], foot);
-  pass(leg.joints.back(), 0, 0, foot);
+  const MovingFrame foot = legs[side].end(s.position, velocity_of_all);
   const SE3 T_LF{SO3::nearest(foot.R), foot.p};
   out.R_IF = T_IL.R * T_LF.R;
   out.corners = static_cast<int>(feet[side].sole.size());
@@ -232,12 +100,12 @@ LegKinematics::LegKinematics(const Robot& robot) : chains_(std::make_unique<Chai
   c.T_IL = robot.imu.T_link_imu.inverse();
   if (!c.by_joints) return;
   if (robot.urdf.empty()) throw std::invalid_argument("robot.urdf is needed to use the legs");
-  const KDL::Tree tree = tree_of(robot);
+  const LinkTree tree(robot);
   for (std::size_t side = 0; side < 2; ++side) {
     const Foot& foot = robot.feet[side];
     if (foot.sole.empty() || foot.sole.size() > max_corners)
       throw std::invalid_argument("robot.feet: the sole of " + foot.name + " needs 1 to " + std::to_string(max_corners) + " points");
-    c.legs[side] = leg_of(tree, robot.imu.link, foot);
+    c.legs[side] = tree.chain(robot.imu.link, foot.link);
   }
 }
 
@@ -272,9 +140,9 @@ std::optional<std::string> LegKinematics::mismatch(const JointSample& s) const {
     if (s.position.size() == 6) return std::nullopt;
     return "legs.type: feet needs messages of six positions, two feet; these have " + std::to_string(s.position.size());
   }
-  for (const Leg& leg : c.legs) {
+  for (const JointChain& leg : c.legs) {
     for (const std::string& joint : leg.names) {
-      if (std::ranges::find(s.names, joint) == s.names.end()) return missing(joint);
+      if (std::ranges::find(s.names, joint) == s.names.end()) return joint_is_missing(joint);
     }
   }
   return std::nullopt;
