@@ -18,6 +18,7 @@
 #include "kilvo/estimator/time_offset.hpp"
 #include "kilvo/estimator/timeline.hpp"
 #include "kilvo/filter/trajectory.hpp"
+#include "kilvo/legs/contact_detector.hpp"
 #include "kilvo/lidar/undistort.hpp"
 #include "kilvo/map/visual_map.hpp"
 #include "kilvo/map/voxel_map.hpp"
@@ -169,7 +170,7 @@ class Estimator {
   std::vector<PointXYZI> seen_W_;  // points of the last sweep
 
   std::optional<LegKinematics> kinematics_;
-  ContactEstimator contacts_;
+  ContactDetector contacts_;
   StanceTracker stances_;
   std::optional<Time> last_legs_;  // while the legs are used
   double leg_period_ = 0;          // between the last two leg samples, s

@@ -7,7 +7,7 @@
 
 namespace kilvo {
 
-LegUpdate update_by_legs(const Feet& feet, Estimate& e, ContactEstimator& contacts, StanceTracker& stances, Replay& replay,
+LegUpdate update_by_legs(const Feet& feet, Estimate& e, ContactDetector& contacts, StanceTracker& stances, Replay& replay,
                          const VoxelMap* map, StanceTracker::Ground ground) {
   LegUpdate out;
   const State& x = e.x;
@@ -16,7 +16,8 @@ LegUpdate update_by_legs(const Feet& feet, Estimate& e, ContactEstimator& contac
   Stopwatch watch;
   contacts.update(feet, x, omega, replay.newest_imu().accel - x.ba, sigma_v, map);
   out.contact_us = watch.lap_us();
-  out.step = stances.step(feet, contacts, x, omega, sigma_v, map, ground);
+  out.step = stances.step(feet, contacts.contacts(), x, omega, sigma_v, map, ground);
+  contacts.adapt(out.step, x, replay.newest_imu().gyro, ground);
   out.passed = replay.take(e, out.step);
   stances.judge(out.step, out.passed);
   return out;

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "kilvo/estimator/replay.hpp"
-#include "kilvo/legs/contact_estimator.hpp"
+#include "kilvo/legs/contact_detector.hpp"
 #include "kilvo/legs/leg_measurements.hpp"
 #include "kilvo/map/voxel_map.hpp"
 
@@ -18,7 +18,7 @@ struct LegUpdate {
 };
 
 /// `e`: predicted to feet.t. `replay`: holds the IMU samples, and gets the step. `map`: on whose planes the feet stand, if any.
-LegUpdate update_by_legs(const Feet& feet, Estimate& e, ContactEstimator& contacts, StanceTracker& stances, Replay& replay,
+LegUpdate update_by_legs(const Feet& feet, Estimate& e, ContactDetector& contacts, StanceTracker& stances, Replay& replay,
                          const VoxelMap* map, StanceTracker::Ground ground);
 
 }  // namespace kilvo

@@ -7,7 +7,7 @@
 
 #include "kilvo/estimator/output.hpp"
 #include "kilvo/estimator/replay.hpp"
-#include "kilvo/legs/contact_estimator.hpp"
+#include "kilvo/legs/contact_detector.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
 #include "kilvo/legs/leg_measurements.hpp"
 #include "kilvo/sensors/robot.hpp"
@@ -50,7 +50,7 @@ class LivePropagator {
   Estimate closed_;  // at an IMU sample
   Estimate now_;     // at the newest measurement
   Replay replay_;    // from closed_ on
-  ContactEstimator contacts_;
+  ContactDetector contacts_;
   StanceTracker stances_;
   std::optional<Time> last_legs_;  // while the legs are used
   double leg_period_ = 0;          // s

@@ -80,6 +80,7 @@ void ContactEstimator::start(const Feet& feet, const State& x, const std::array<
     f = {};
     f.since = feet.t - milliseconds(1000);
     f.ground = {-x.g.normalized(), motion[side].lowest, 0};
+    contacts_.since[side] = f.since;
   }
   guess_standing(feet, x, motion);
   ground_.forget();
@@ -223,6 +224,7 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
       f.slow.reset();
     }
     if (contacts_.on[side]) stand(f, m, x, !stood, map);
+    contacts_.since[side] = f.since;
     contacts_.ground[side] = f.ground;
     contacts_.clearance[side] = f.ground.height_of(m.lowest);
     contacts_.d_fv[side] = detection_threshold * m.slowest / (config_.lift_off_speed * swing_speed_);

@@ -17,10 +17,14 @@ namespace kilvo {
 struct Contacts {
   Time t{};
   std::array<bool, 2> on = {true, true};
+  std::array<Time, 2> since{};               // when each foot came down or left
   std::array<double, 2> clearance = {0, 0};  // of the lowest point over the ground on which it stood last, m
   double d_a = 0;                            // normalised deviation of the acceleration
   std::array<double, 2> d_fv = {0, 0};       // normalised deviation of the foot's velocity; above 10: it moves
   std::array<GroundPatch, 2> ground;         // on which each stands or stood last
+
+  /// How long a foot has been on or off, s.
+  double phase(std::size_t side) const { return to_seconds(t - since[side]); }
 };
 
 /// Velocity in the world of a point that is at p_I and moves by v_I relative to the IMU, m/s. `omega`: bias-free rate, rad/s.
@@ -52,8 +56,6 @@ class ContactEstimator {
   const Contacts& contacts() const { return contacts_; }
   /// The largest speed of a foot in its last swings, m/s; what all speeds are compared with.
   double swing_speed() const { return swing_speed_; }
-  /// How long a foot has been on or off, s.
-  double phase(std::size_t side, Time t) const { return to_seconds(t - foot_[side].since); }
 
   /// Forgets the feet, not the robot: after a gap in the legs' messages. Both are taken as standing until they move; when the velocity is
   /// not known, none until it has shown itself: the foot that stands is the one whose velocity is wrong by what does not change.

@@ -1,6 +1,7 @@
 // Settings of the legs. No length, weight or speed of a particular robot is in them: speeds are compared with the robot's own steps.
 #pragma once
 
+#include <string>
 #include <tuple>
 
 #include "kilvo/math/field.hpp"
@@ -8,6 +9,7 @@
 namespace kilvo {
 
 struct LegConfig {
+  std::string contact = "kilvo";           // kilvo | paper
   double lift_off_speed = 0.1;             // share of the robot's swing speed
   double touchdown_speed = 0.06;           // share of the robot's swing speed
   double impact_drop = 0.62;               // share of the speed before
@@ -23,6 +25,8 @@ struct LegConfig {
 
   static constexpr auto fields() {
     return std::tuple{
+        Field{"contact", &LegConfig::contact, "-",
+              "how contacts are estimated; kilvo: our own way; paper: as Section V of the paper prints it, to be compared"},
         Field{"lift_off_speed", &LegConfig::lift_off_speed, "-",
               "a foot none of whose corners is slower than this share of the robot's own swing speed has left the ground"},
         Field{"touchdown_speed", &LegConfig::touchdown_speed, "-",

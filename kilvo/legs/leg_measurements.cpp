@@ -104,6 +104,10 @@ bool LegModel::add_motion(LegRows& rows, int count, std::size_t side, const Stat
   rows.R.block<3, 3>(count, count) = along * (vertical2 - velocity2) * up_W * up_W.transpose();
   rows.R.diagonal().segment<3>(count).array() += along * velocity2;
   rows.R.diagonal().segment<3>(count + 3).setConstant(foot.variance_scale * position2 * std::max(1.0, config_.position_correlation / dt));
+  if (foot.row_scale) {
+    const Eigen::Matrix<double, 6, 1> scale = foot.row_scale->head<6>().cwiseSqrt();
+    rows.R.block<6, 6>(count, count) = (scale.asDiagonal() * rows.R.block<6, 6>(count, count) * scale.asDiagonal()).eval();
+  }
   return true;
 }
 
@@ -113,7 +117,8 @@ bool LegModel::add_height(LegRows& rows, int count, std::size_t side, const Stat
   if (!ground) return false;
   const int pc = at::pcl + 3 * static_cast<int>(side);
   const FootHeightRow h = foot_height(*ground, x.pc[side]);
-  const double variance = ground->sigma * ground->sigma + config_.ground_sigma * config_.ground_sigma;
+  const double scale = step_.foot[side].row_scale ? (*step_.foot[side].row_scale)[6] : 1.0;
+  const double variance = scale * (ground->sigma * ground->sigma + config_.ground_sigma * config_.ground_sigma);
   const double spread = h.J_pc * prior.block<3, 3>(pc, pc) * h.J_pc.transpose();
   if (h.r * h.r > config_.gate * config_.gate * (spread + variance)) return false;
   rows.H.block<1, 3>(count, pc) = h.J_pc;
@@ -244,8 +249,8 @@ bool StanceTracker::stuck(std::size_t side, const Feet& feet, const Eigen::Vecto
   return feet.t - changed_[side] > longest_stillness && changed_[1 - side] > changed_[side] && omega.norm() > surely_turning;
 }
 
-LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega,
-                            double sigma_v, const VoxelMap* map, Ground ground) {
+LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v,
+                            const VoxelMap* map, Ground ground) {
   LegStep out;
   out.t = feet.t;
   out.dt = last_ ? std::clamp(to_seconds(feet.t - *last_), shortest_step, longest_step) : longest_step;
@@ -255,9 +260,9 @@ LegStep StanceTracker::step(const Feet& feet, const ContactEstimator& contacts, 
     Stance& foot = out.foot[side];
     foot.ends = std::exchange(leave_[side], false);
     foot.R_IF = pose.R_IF;
-    const double phase = contacts.phase(side, feet.t);
+    const double phase = contacts.phase(side);
     const auto [weights, least] = share_of_corners(pose, x, omega);
-    const bool stands = contacts.contacts().on[side] && phase >= config_.entry_delay;
+    const bool stands = contacts.on[side] && phase >= config_.entry_delay;
     if (stuck(side, feet, omega) || !stands || !may_stand(side, least, sigma_v)) {
       foot.ends = foot.ends || weights_[side].has_value();
       weights_[side].reset();

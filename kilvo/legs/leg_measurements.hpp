@@ -1,6 +1,7 @@
 // The leg measurement (paper, Eqs. 4 to 8): a standing foot does not move. Rows of all standing feet are stacked in one update.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -14,12 +15,13 @@ namespace kilvo {
 
 /// What one leg sample says about one foot.
 struct Stance {
-  bool begins = false;                              // from now on its contact position is part of the state
-  bool ends = false;                                // from now on it is not
-  bool used = false;                                // it stands: rows are made of it
-  SolePoint point;                                  // on which it stands; IMU frame
-  Eigen::Vector3d shift = Eigen::Vector3d::Zero();  // from where the point was in the sole before to where it is now; IMU frame, m
-  double variance_scale = 1;                        // factor on the variance of its rows (Eq. 8)
+  bool begins = false;                                   // from now on its contact position is part of the state
+  bool ends = false;                                     // from now on it is not
+  bool used = false;                                     // it stands: rows are made of it
+  SolePoint point;                                       // on which it stands; IMU frame
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();       // from where the point was in the sole before to where it is now; IMU frame, m
+  double variance_scale = 1;                             // factor on the variance of its rows (Eq. 8)
+  std::optional<Eigen::Matrix<double, 7, 1>> row_scale;  // another one on that of each: velocity, position, height
   SO3 R_IF;
   std::optional<GroundPatch> ground;  // on which it has just come down: its height counts once
 };
@@ -102,7 +104,7 @@ class StanceTracker {
   enum class Ground : std::uint8_t { use, learn };
 
   /// `omega`: bias-free, rad/s. `sigma_v`: uncertainty of the velocity of x, m/s. `map`: on whose planes the feet come down.
-  LegStep step(const Feet& feet, const ContactEstimator& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0,
+  LegStep step(const Feet& feet, const Contacts& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0,
                const VoxelMap* map = nullptr, Ground ground = Ground::use);
 
   /// Both feet leave the filter at the next step, to enter anew.

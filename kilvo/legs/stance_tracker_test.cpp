@@ -67,7 +67,7 @@ class Filter {
       e = predict(e, ImuInterval::hold(level_imu, e.t, feet.t), stances, {});
       const Eigen::Vector3d omega = -e.x.bg;
       contacts_.update(feet, e.x, omega, level_imu.accel - e.x.ba);
-      last = tracker_.step(feet, contacts_, e.x, omega);
+      last = tracker_.step(feet, contacts_.contacts(), e.x, omega);
       for (std::size_t side = 0; side < 2; ++side) {
         if (last.foot[side].ends) end_stance(e, side);
         if (last.foot[side].begins) begin_stance(e, side, last.foot[side].point, config_);
@@ -225,22 +225,22 @@ TEST(StanceTracker, AFootEntersAfterItsDelayLooselyAndLeavesWithItsContact) {
     const double s = 1e-3 * i;
     const Feet feet = gait.feet(s);
     contacts.update(feet, gait.body(s), Eigen::Vector3d::Zero(), level_imu.accel);
-    const LegStep step = tracker.step(feet, contacts, gait.body(s), Eigen::Vector3d::Zero());
+    const LegStep step = tracker.step(feet, contacts.contacts(), gait.body(s), Eigen::Vector3d::Zero());
     EXPECT_TRUE(i == 0 || std::abs(step.dt - 1e-3) < 1e-12);
     for (std::size_t side = 0; side < 2; ++side) {
       const Stance& foot = step.foot[side];
       const bool on = contacts.contacts().on[side];
-      EXPECT_EQ(foot.used, on && contacts.phase(side, feet.t) >= config.entry_delay);
+      EXPECT_EQ(foot.used, on && contacts.contacts().phase(side) >= config.entry_delay);
       EXPECT_EQ(foot.used, tracker.standing(side));
       EXPECT_EQ(foot.begins, foot.used && !inside[side]);
       EXPECT_EQ(foot.ends, !foot.used && inside[side]);
       if (foot.begins && i > 100) {
         EXPECT_GT(foot.variance_scale, 9);
-        EXPECT_NEAR(contacts.phase(side, feet.t), config.entry_delay, 0.0011);
+        EXPECT_NEAR(contacts.contacts().phase(side), config.entry_delay, 0.0011);
         ++entered;
       }
       left += foot.ends ? 1 : 0;
-      const bool settled = foot.used && contacts.phase(side, feet.t) > 0.1 && gait.stands(side, s);
+      const bool settled = foot.used && contacts.contacts().phase(side) > 0.1 && gait.stands(side, s);
       EXPECT_TRUE(!settled || foot.variance_scale < 1.001);
       inside[side] = foot.used;
     }
@@ -266,7 +266,7 @@ TEST(StanceTracker, AFootThatIsRefusedForLongLeavesAndEntersAnewWhereItComesToRe
     feet.foot = {test::seen_from(body, left), test::seen_from(body, standing(1))};
     contacts.update(feet, body, Eigen::Vector3d::Zero(), level_imu.accel);
     ASSERT_TRUE(contacts.contacts().on[0]) << "slower than a swing: reported as standing";
-    const LegStep step = tracker.step(feet, contacts, body, Eigen::Vector3d::Zero());
+    const LegStep step = tracker.step(feet, contacts.contacts(), body, Eigen::Vector3d::Zero());
     tracker.judge(step, {step.foot[0].used && !slides, step.foot[1].used});
     EXPECT_TRUE(step.foot[1].used);
     ended += step.foot[0].ends ? 1 : 0;
@@ -292,7 +292,7 @@ TEST(StanceTracker, AFootWhoseEncodersAreFrozenWhileTheBodyTurnsIsNotUsed) {
       feet.foot = {test::seen_from(body, standing(0)), test::seen_from(body, standing(1))};
       feet.foot[1].p[0].x() += 1e-9 * i;
       contacts.update(feet, body, Eigen::Vector3d::Zero(), level_imu.accel);
-      step = tracker.step(feet, contacts, body, Eigen::Vector3d(0, 0, rate));
+      step = tracker.step(feet, contacts.contacts(), body, Eigen::Vector3d(0, 0, rate));
     }
     EXPECT_EQ(step.foot[0].used, rate == 0) << "a robot at rest may repeat itself";
     EXPECT_EQ(tracker.standing(1), true);
@@ -314,7 +314,7 @@ TEST(StanceTracker, TheGroundCountsOnceAtEachTouchdownAndOnlyWhereThereIsAMap) {
       const double s = 1e-3 * i;
       const Feet feet = gait.feet(s);
       contacts.update(feet, gait.body(s), Eigen::Vector3d::Zero(), level_imu.accel);
-      const LegStep step = tracker.step(feet, contacts, gait.body(s), Eigen::Vector3d::Zero(), 0, ground);
+      const LegStep step = tracker.step(feet, contacts.contacts(), gait.body(s), Eigen::Vector3d::Zero(), 0, ground);
       for (const Stance& foot : step.foot) {
         entered += foot.begins ? 1 : 0;
         with_ground += foot.ground ? 1 : 0;

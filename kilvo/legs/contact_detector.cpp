@@ -1,0 +1,63 @@
+#include "kilvo/legs/contact_detector.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace kilvo {
+namespace {
+
+// Of a patch that the robot's own contacts span: it ties steps to each other, it is no absolute height, m.
+constexpr double contact_patch_sigma = 0.01;
+
+std::variant<ContactEstimator, PaperContactEstimator> make(const LegConfig& config) {
+  if (config.contact == "kilvo") return ContactEstimator(config);
+  if (config.contact == "paper") return PaperContactEstimator();
+  throw std::invalid_argument("legs.contact: '" + config.contact + "' is neither 'kilvo' nor 'paper'");
+}
+
+// r_c of Eq. 7: velocity and position in the world, height over the ground.
+PaperContactEstimator::Residual residual_of(const Stance& foot, const GroundPatch& ground, const State& x, const Eigen::Vector3d& pc,
+                                            const Eigen::Vector3d& gyro) {
+  PaperContactEstimator::Residual r;
+  r << foot_velocity(x, foot.point, gyro).r, foot_position(x, foot.point, pc).r, foot_height(ground, pc).r;
+  return r;
+}
+
+}  // namespace
+
+ContactDetector::ContactDetector(const LegConfig& config) : detector_(make(config)) {}
+
+const Contacts& ContactDetector::update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel,
+                                        double sigma_v, const VoxelMap* map) {
+  if (auto* paper = std::get_if<PaperContactEstimator>(&detector_)) return paper->update(feet, x, omega, accel, map);
+  return std::get<ContactEstimator>(detector_).update(feet, x, omega, accel, sigma_v, map);
+}
+
+const Contacts& ContactDetector::contacts() const {
+  return std::visit([](const auto& d) -> const Contacts& { return d.contacts(); }, detector_);
+}
+
+void ContactDetector::restart() {
+  std::visit([](auto& d) { d.restart(); }, detector_);
+}
+
+void ContactDetector::adapt(LegStep& step, const State& x, const Eigen::Vector3d& gyro, StanceTracker::Ground ground) {
+  auto* paper = std::get_if<PaperContactEstimator>(&detector_);
+  if (paper == nullptr) return;
+  for (std::size_t side = 0; side < 2; ++side) {
+    Stance& foot = step.foot[side];
+    if (!foot.used) continue;
+    const Eigen::Vector3d pc = foot.begins ? x.pose() * foot.point.p : Eigen::Vector3d(x.pc[side] + x.R * foot.shift);
+    const auto r = residual_of(foot, paper->contacts().ground[side], x, pc, gyro);
+    paper->learn(side, r);
+    foot.row_scale = paper->row_scale(r);
+    foot.variance_scale = 1;
+    // Without a map the ground is that of the earlier contacts (KI).
+    const auto& patch = paper->contact_patch(side);
+    if (!foot.begins || foot.ground || !patch || ground != StanceTracker::Ground::use) continue;
+    foot.ground = patch;
+    foot.ground->sigma = std::max(patch->sigma, contact_patch_sigma);
+  }
+}
+
+}  // namespace kilvo

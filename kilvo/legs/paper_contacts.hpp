@@ -1,0 +1,99 @@
+// The paper's contact estimation (Section V), as it is printed: deviations from the robot's own statistics of its first swing, with the
+// same two numbers (theta_d, N_d) for every robot and gait. Selected by legs.contact: paper; docs/decisions say what the text leaves open
+// and how it is read here.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+#include "kilvo/legs/clearance_window.hpp"
+#include "kilvo/legs/contact_estimator.hpp"
+#include "kilvo/legs/signal_statistics.hpp"
+
+namespace kilvo {
+
+/// A cue that counts only once it has lasted.
+class HeldCue {
+ public:
+  /// True once `on` has been true in each sample of N_d frames; a frame is 1 ms of leg time, and three samples it must be.
+  bool update(bool on, Time t);
+  void reset() { samples_ = 0; }
+
+ private:
+  Time since_{};
+  int samples_ = 0;
+};
+
+class PaperContactEstimator {
+ public:
+  static constexpr double theta_d = 10;  // Section V-B
+  static constexpr int N_d = 5;          // frames
+  static constexpr double alpha_s = 10;  // Eq. 8
+
+  /// Velocity, position and height of a supporting foot: the rows of r_c (Eq. 7).
+  using Residual = Eigen::Matrix<double, 7, 1>;
+
+  /// `x`: the state at feet.t. `omega`, `accel`: bias-free rate (rad/s) and specific force (m/s^2) of the IMU. `map`: where the ground is
+  /// looked up, if there is one.
+  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel,
+                         const VoxelMap* map = nullptr);
+  const Contacts& contacts() const { return contacts_; }
+
+  /// Forgets the feet, not the statistics: after a gap in the legs' messages. Both are taken as standing until they move.
+  void restart() { started_ = false; }
+
+  /// r_c of a foot that carries rows in this sample: while the first swing lasts its statistics are learned from it.
+  void learn(std::size_t side, const Residual& r);
+  /// Eq. 8, row by row: the factor on each row's variance. Ones before there are statistics.
+  Residual row_scale(const Residual& r) const;
+
+  /// The ground that earlier contacts span under the contact of this foot; nothing before there were three.
+  const std::optional<GroundPatch>& contact_patch(std::size_t side) const { return foot_[side].contact_patch; }
+
+  /// Swing time and S_sw are known: the first step has been completed.
+  bool initialised() const { return swing_time_.has_value(); }
+  /// Delta t_sw, s; 0 before it is known.
+  double swing_time() const { return swing_time_ ? to_seconds(*swing_time_) : 0; }
+
+ private:
+  /// S_st or S_sw: of the acceleration, of the velocity of a supporting foot and of its residual.
+  struct Reference {
+    SignalStatistics<3> accel, foot_velocity;
+    SignalStatistics<7> residual;
+  };
+  struct FootMotionNow {
+    Eigen::Vector3d velocity, lowest;  // in the world, m/s and m
+  };
+  struct FootState {
+    HeldCue moving, slow, calm, fast;
+    bool settled = true;                         // since touchdown
+    bool was_fast = false, passed_peak = false;  // since lift-off
+    GroundPatch ground;
+    std::optional<GroundPatch> contact_patch;
+    ClearanceWindow clearances;
+  };
+
+  void start(const Feet& feet, const State& x, const std::array<FootMotionNow, 2>& motion);
+  bool record_still_start(Time t, const Eigen::Vector3d& accel, const std::array<FootMotionNow, 2>& motion);
+  void record_first_swing(const Eigen::Vector3d& accel, const std::array<FootMotionNow, 2>& motion);
+  void lift_off(std::size_t side, Time t);
+  void touchdown(std::size_t side, Time t, const FootMotionNow& m, const State& x, const VoxelMap* map);
+  bool lands(std::size_t side, bool impact, double d_fv, Time t);
+  bool has_larger_area(std::size_t side) const;
+  Duration window() const;
+
+  Contacts contacts_;
+  bool started_ = false;
+  Time still_since_{};
+  Reference static_, swing_, learning_;  // S_st, S_sw, and S_sw while the first swing lasts
+  bool static_known_ = false;
+  std::optional<Duration> swing_time_;
+  std::optional<std::size_t> first_swing_;  // the foot whose swing S_sw is learned from
+  HeldCue impact_;
+  GroundLookup ground_;
+  int touchdowns_ = 0;
+  std::array<FootState, 2> foot_;
+};
+
+}  // namespace kilvo
