@@ -25,6 +25,7 @@ ResultFiles::ResultFiles(const std::filesystem::path& folder, double smooth_time
       states_(folder / "states.csv", state_columns),
       modality_(folder / "modality.csv", "t,modality,cause"),
       timing_(folder / "timing.csv", "t,stage,microseconds"),
+      events_(folder / "events.csv", "t,sensor,reason,value,text"),
       folder_(folder),
       smoothing_(smooth_time) {}
 
@@ -51,6 +52,17 @@ void ResultFiles::write_sweep(const Output& output) {
   }
   if (output.is_sweep || output.is_image) write_stages(output);
   write_indicators(output);
+  write_events(output.events);
+}
+
+void ResultFiles::write_events(const std::vector<Event>& events) {
+  for (const Event& event : events) {
+    std::string line, text = text_of(event);
+    lab::append_seconds(line, event.t);
+    for (std::size_t quote = text.find('"'); quote != std::string::npos; quote = text.find('"', quote + 2)) text.insert(quote, 1, '"');
+    events_.write(
+        fmt::format("{},{},{},{:.9g},\"{}\"", line, event.sensor ? name_of(*event.sensor) : "", name_of(event.reason), event.value, text));
+  }
 }
 
 void ResultFiles::write_contacts(const Output& output) {
@@ -105,7 +117,7 @@ void ResultFiles::write_full_state(const Output& output) {
 void ResultFiles::write_modality(const Output& output) {
   std::string line;
   lab::append_seconds(line, output.t);
-  modality_.write(fmt::format("{},{},{}", line, name_of(output.modality), output.cause));
+  modality_.write(fmt::format("{},{},{}", line, name_of(output.modality), text_of(output.cause)));
   last_modality_ = output.modality;
 }
 
@@ -131,6 +143,7 @@ void ResultFiles::close() {
   states_.close();
   modality_.close();
   timing_.close();
+  events_.close();
   if (contacts_) contacts_->close();
   if (degradation_) degradation_->close();
 }

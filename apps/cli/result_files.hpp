@@ -22,6 +22,7 @@ class ResultFiles {
   /// Of a live runner, whose states and sweeps come apart.
   void write_state(const Output& output);
   void write_sweep(const Output& output);
+  void write_events(const std::vector<Event>& events);
   void close();
 
   const RunSummary& run_summary() const { return run_summary_; }
@@ -34,7 +35,7 @@ class ResultFiles {
   void write_indicators(const Output& output);
 
   lab::TumWriter odometry_, smooth_, sweeps_;
-  CsvFile states_, modality_, timing_;
+  CsvFile states_, modality_, timing_, events_;
   std::filesystem::path folder_;
   SmoothOdometry smoothing_;
   std::optional<CsvFile> contacts_;     // from the first leg sample on

@@ -73,6 +73,7 @@ class Run {
   int all() {
     const bool interrupted = options_.realtime ? replay_live() : replay();
     progress_.finish();
+    files_.write_events(estimator_.take_events());
     files_.close();
     facts_.failure = failure(interrupted);
     for (const Sensor sensor : facts_.sensors) facts_.withheld[static_cast<std::size_t>(sensor)] = failing_.dropped(sensor);

@@ -135,7 +135,7 @@ Json config_json(const lab::Settings& settings) {
 std::vector<std::string> all_warnings(const RunFacts& facts, const lab::RecordingSource& source, const Statistics& statistics) {
   std::vector<std::string> out = facts.warnings;
   for (const std::string& text : source.warnings()) out.push_back(text);
-  out.insert(out.end(), statistics.warnings.begin(), statistics.warnings.end());
+  for (const std::string& text : warnings_of(statistics)) out.push_back(text);
   if (facts.live) {
     out.insert(out.end(), facts.live->warnings.begin(), facts.live->warnings.end());
     for (const Sensor s : facts.sensors) {

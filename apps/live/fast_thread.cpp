@@ -48,7 +48,7 @@ void LiveRunner::take(const Sample& sample) {
     ++statistics_.dropped[static_cast<std::size_t>(Sensor::legs)];
     return;
   }
-  if (fault_of(sample.joints) != nullptr) return;
+  if (fault_of(sample.joints)) return;
   const auto known = fast_kinematics_->feet(sample.joints);
   const auto* feet = std::get_if<Feet>(&known);
   if (feet == nullptr) return;

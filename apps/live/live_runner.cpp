@@ -46,7 +46,7 @@ void LiveRunner::push(Measurement m) {
   const auto* joints = std::get_if<JointSample>(&m);
   const auto s = static_cast<std::size_t>(sensor_of(m));
   // What is not to be used the estimator sees as well, and counts.
-  const bool usable = used_[s] && clock_steps_.follow(m) == nullptr;
+  const bool usable = used_[s] && !clock_steps_.follow(m);
   note_clock_steps();
   if (usable && (imu != nullptr || joints != nullptr)) {
     if (Sample* slot = samples_.vacant()) {
@@ -161,17 +161,18 @@ void LiveRunner::answer(std::vector<Output>& outputs, Clock::time_point since) {
 void LiveRunner::keep_raw(const Measurement& m) {
   if (const auto* imu = std::get_if<ImuSample>(&m)) slow_raw_.keep(*imu);
   const auto* joints = std::get_if<JointSample>(&m);
-  if (joints == nullptr || !slow_kinematics_ || fault_of(*joints) != nullptr) return;
+  if (joints == nullptr || !slow_kinematics_ || fault_of(*joints)) return;
   const auto known = slow_kinematics_->feet(*joints);
   if (const auto* feet = std::get_if<Feet>(&known)) slow_raw_.keep(*feet);
 }
 
-// Sweeps and images; the states in between are the fast thread's. True when there was one.
+// Sweeps, images and events; the states in between are the fast thread's. True when there was a sweep or an image.
 bool LiveRunner::pass_on(std::vector<Output>& outputs) {
   bool any = false;
   for (Output& output : outputs) {
-    if (!output.is_sweep && !output.is_image) continue;
-    any = true;
+    const bool corrects = output.is_sweep || output.is_image;
+    if (!corrects && output.events.empty()) continue;
+    any = any || corrects;
     const std::lock_guard lock(slow_outputs_mutex_);
     if (slow_outputs_.size() < most_slow_outputs || input_ended_) {
       slow_outputs_.push_back(std::move(output));
@@ -180,7 +181,7 @@ bool LiveRunner::pass_on(std::vector<Output>& outputs) {
       ++slow_outputs_dropped_;
     }
   }
-  if (any) for_output_.post();
+  if (!outputs.empty()) for_output_.post();
   return any;
 }
 

@@ -40,7 +40,7 @@ struct LiveStatistics {
 class LiveRunner {
  public:
   /// Each is called by the third thread, in time order by itself. `state`: of every leg sample, or IMU sample. `sweep`: of every sweep and
-  /// image, as the estimator gives them; their states are of the past.
+  /// image, and whatever has events, as the estimator gives them; their states are of the past.
   struct Sinks {
     std::function<void(Output)> state, sweep;
   };

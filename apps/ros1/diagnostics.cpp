@@ -84,19 +84,19 @@ DiagnosticStatus status_of_estimate(const Condition& c) {
   const EstimateState& e = *c.estimate;
   std::uint8_t level = lost.empty() ? DiagnosticStatus::OK : DiagnosticStatus::WARN;
   if (e.modality == Modality::coast || c.seen.diverged || trouble_of(Sensor::imu, c)) level = DiagnosticStatus::ERROR;
-  std::string text = fmt::format("{} ({})", name_of(e.modality), e.cause);
+  std::string text = fmt::format("{} ({})", name_of(e.modality), text_of(e.cause));
   if (!lost.empty()) text += ", lost: " + lost;
   if (c.seen.diverged) text += ", diverged";
   say(out, level, text);
   add(out, "modality", name_of(e.modality));
-  add(out, "cause", e.cause);
+  add(out, "cause", text_of(e.cause));
   add(out, "lost", lost.empty() ? "none" : lost);
   add(out, "outputs", std::to_string(e.outputs));
   add(out, "position, one sigma (m)", fmt::format("{:.4f}", std::sqrt(std::max(0.0, e.position_covariance.trace()))));
   add(out, "IMU outages", std::to_string(c.seen.imu_outages));
   add(out, "states thrown away", std::to_string(c.seen.rollbacks));
   add(out, "sweeps not mapped in time", std::to_string(c.clouds_given_up));
-  for (const std::string& warning : c.seen.warnings) add(out, "warning", warning);
+  for (const std::string& warning : warnings_of(c.seen)) add(out, "warning", warning);
   return out;
 }
 

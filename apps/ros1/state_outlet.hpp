@@ -18,7 +18,7 @@ namespace kilvo::ros1 {
 struct EstimateState {
   Time t{};
   Modality modality = Modality::coast;
-  const char* cause = "start";
+  Reason cause = Reason::start;
   std::uint64_t outputs = 0;
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();  // m^2
 };

@@ -41,6 +41,7 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   keep_finite();
   if (s.t - anchor_.t > longest_replay && pending_.empty()) rebase(closed_);
   choose_modality(s.t);
+  look_at_streams(s.t);
   zero_velocity_update(s);
   if (!last_legs_ || are_legs_overdue(s.t - *last_legs_, robot_.legs.rate, leg_period_)) emit(out);
 }
@@ -63,12 +64,12 @@ void Estimator::keep_a_stance(const LegStep& step, const std::array<bool, 2>& pa
 
 void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   Stopwatch watch;
-  if (s.t < estimate_->t || !replay_.has_imu()) return drop(Sensor::legs, "before the state");
-  if (to_seconds(s.t - replay_.newest_imu().t) > longest_held_imu(robot_.imu.rate)) return drop(Sensor::legs, "no IMU");
-  if (recovery_.imu_lost) return drop(Sensor::legs, "no IMU");
-  if (!legs_may_return(s.t)) return drop(Sensor::legs, "not calm yet");
+  if (s.t < estimate_->t || !replay_.has_imu()) return drop(Sensor::legs, Reason::before_state);
+  if (to_seconds(s.t - replay_.newest_imu().t) > longest_held_imu(robot_.imu.rate)) return drop(Sensor::legs, Reason::no_imu);
+  if (recovery_.imu_lost) return drop(Sensor::legs, Reason::no_imu);
+  if (!legs_may_return(s.t)) return drop(Sensor::legs, Reason::not_calm);
   auto known = kinematics_->feet(s);
-  if (const auto* fault = std::get_if<std::string>(&known)) return drop(Sensor::legs, *fault);
+  if (const auto* fault = std::get_if<std::string>(&known)) return drop(Sensor::legs, Reason::wrong_joints, *fault);
   const Feet& feet = std::get<Feet>(known);
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::legs)].used;
   if (last_legs_) leg_period_ = std::min(0.1, to_seconds(s.t - *last_legs_));

@@ -25,7 +25,7 @@ double distance(Duration a, Duration b) { return std::abs(to_seconds(a) - to_sec
 
 }  // namespace
 
-const char* ClockSteps::follow_imu(Time t) {
+std::optional<Reason> ClockSteps::follow_imu(Time t) {
   Duration& offset = offset_[static_cast<std::size_t>(Sensor::imu)];
   const Time now = t + offset;
   const bool near = !imu_ || (now > *imu_ - least_step && now < *imu_ + longest_interval);
@@ -37,7 +37,7 @@ const char* ClockSteps::follow_imu(Time t) {
     elsewhere_ = 0;
     legs_then_ = legs_;
     imu_ = std::max(imu_.value_or(now), now);
-    return nullptr;
+    return std::nullopt;
   }
   const bool goes_on = elsewhere_ > 0 && now > newest_there_ && now - newest_there_ < longest_interval;
   if (!goes_on) {
@@ -49,22 +49,22 @@ const char* ClockSteps::follow_imu(Time t) {
   const bool back = now < *imu_;
   const bool with_others = for_ >= votes && for_ > against_, alone = against_ >= votes && against_ > for_ && legs_spacing_ < often;
   const bool seconded = elsewhere_ >= few_witnesses && (alone || (back && with_others));
-  if (back && !seconded && (elsewhere_ < witnesses || !is_sure())) return "its clock went back";
-  if (alone_ahead && !seconded && elsewhere_ < witnesses) return "its clock went ahead";
-  if (!back && !alone_ahead && elsewhere_ < witnesses) return nullptr;
+  if (back && !seconded && (elsewhere_ < witnesses || !is_sure())) return Reason::clock_back;
+  if (alone_ahead && !seconded && elsewhere_ < witnesses) return Reason::clock_forward;
+  if (!back && !alone_ahead && elsewhere_ < witnesses) return std::nullopt;
   const int there = std::exchange(elsewhere_, 0);
   // Ahead with all the others, it is a gap, or a mistake: the timeline looks into that.
-  if (!back && !(alone_ahead && seconded)) return imu_ = now, nullptr;
+  if (!back && !(alone_ahead && seconded)) return imu_ = now, std::nullopt;
   // Nothing is missing: the first of them came one period after the newest before.
   const Duration period = (now - first_there_) / (there - 1);
   last_ = *imu_ + period - first_there_;
-  if (offset + last_ > largest_offset || offset + last_ < -largest_offset) return "its clock went back";
+  if (offset + last_ > largest_offset || offset + last_ < -largest_offset) return Reason::clock_back;
   ++count_;
   open_until_.fill(std::nullopt);
   open_.fill(true);
   offset += last_;
   imu_ = now + last_;
-  return nullptr;
+  return std::nullopt;
 }
 
 // The others must have said whether they went back as well; when nobody else speaks, nobody is asked.
@@ -93,14 +93,14 @@ void ClockSteps::put(Measurement& m, std::size_t s) const {
   std::visit([&](auto& x) { x.t += offset_[s]; }, m);
 }
 
-const char* ClockSteps::follow(Measurement& m) {
+std::optional<Reason> ClockSteps::follow(Measurement& m) {
   const Sensor sensor = sensor_of(m);
   const auto s = static_cast<std::size_t>(sensor);
   const Time t = stamp_of(m);
-  if (t < earliest || t > latest) return "absurd stamp";
+  if (t < earliest || t > latest) return Reason::absurd_stamp;
   if (sensor == Sensor::imu) {
-    if (const char* fault = follow_imu(t)) return fault;
-    return put(m, s), nullptr;
+    if (const auto fault = follow_imu(t)) return fault;
+    return put(m, s), std::nullopt;
   }
   if (sensor == Sensor::legs) {
     const Time now = t + offset_[s];
@@ -121,7 +121,7 @@ const char* ClockSteps::follow(Measurement& m) {
   } else if (imu_) {
     vote(s, t);
   }
-  return put(m, s), nullptr;
+  return put(m, s), std::nullopt;
 }
 
 }  // namespace kilvo

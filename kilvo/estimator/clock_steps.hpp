@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "kilvo/estimator/reason.hpp"
 #include "kilvo/sensors/measurement.hpp"
 
 namespace kilvo {
@@ -14,14 +15,14 @@ class ClockSteps {
  public:
   /// Takes the measurements in the order of their arrival and puts each onto the time axis of the first. Says why one is not to be used:
   /// the IMU's time has stepped, and whether it stays so is not known yet. Such a one is left as it is.
-  const char* follow(Measurement& m);
+  std::optional<Reason> follow(Measurement& m);
 
   /// How often the IMU's time stepped for good, and by how much it went back at the last time (ahead: negative).
   std::uint64_t count() const { return count_; }
   Duration last() const { return last_; }
 
  private:
-  const char* follow_imu(Time t);
+  std::optional<Reason> follow_imu(Time t);
   bool is_sure() const;
   bool has_run_ahead(Time now) const;
   void put(Measurement& m, std::size_t s) const;

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <string>
 
-#include "kilvo/estimator/clock_step_warning.hpp"
 #include "kilvo/estimator/decimals.hpp"
 #include "kilvo/estimator/estimator.hpp"
 
@@ -17,9 +16,8 @@ constexpr double worth_moving = 2e-3, worth_refining = 5e-4;
 
 void Estimator::note_clock_step() {
   statistics_.clock_steps = clock_steps_.count();
-  constexpr std::uint64_t most = 10;
-  if (clock_steps_.count() > most) return;
-  statistics_.warnings.push_back(warning_of_last(clock_steps_));
+  const double back = to_seconds(clock_steps_.last());
+  report(Sensor::imu, Reason::imu_clock_stepped, std::abs(back), back > 0 ? "back" : "ahead");
 }
 
 void Estimator::shift(Measurement& m) const {
@@ -62,13 +60,7 @@ void Estimator::move_clock(Sensor sensor, double by) {
   shift_[s] = from_seconds(total);
   statistics_.clock_shift[s] = total;
   const std::string name = name_of(sensor);
-  if (!shift_is_said_[s]) {
-    shift_is_said_[s] = statistics_.warnings.size();
-    statistics_.warnings.emplace_back();
-  }
-  statistics_.warnings[*shift_is_said_[s]] =
-      name + ": its clock is " + decimals(1e3 * std::abs(total), 1) + " ms " + (total > 0 ? "behind" : "ahead of") +
-      " the IMU's, and is corrected from when that was seen: set " + name + ".time_offset to " + decimals(configured + total, 4);
+  report(sensor, Reason::clock_offset, total, name + ".time_offset to " + decimals(configured + total, 4));
 }
 
 }  // namespace kilvo

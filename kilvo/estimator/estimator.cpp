@@ -67,16 +67,16 @@ std::vector<Output> Estimator::push(Measurement m) {
 
 void Estimator::push(Measurement m, std::vector<Output>& out) {
   const Sensor s = sensor_of(m);
-  if (!used_[static_cast<std::size_t>(s)]) return drop(s, "not used");
-  const char* back = clock_steps_.follow(m);  // whatever it says, it has a time
+  if (!used_[static_cast<std::size_t>(s)]) return drop(s, Reason::not_used);
+  const auto back = clock_steps_.follow(m);  // whatever it says, it has a time
   if (clock_steps_.count() > statistics_.clock_steps) note_clock_step();
-  if (const char* fault = fault_of(m)) return drop(s, fault);
-  if (back != nullptr) return drop(s, back);
-  if (const char* fault = health_.judge(m)) return drop(s, fault);
+  if (const auto fault = fault_of(m)) return drop(s, *fault);
+  if (back) return drop(s, *back);
+  if (const auto fault = health_.judge(m)) return drop(s, *fault);
   shift(m);
   if (health_.imu_silence() > blind_gap) lose_imu(out);
   if (const auto refused = timeline_.push(std::move(m))) return drop(s, *refused);
-  for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, "time jump");
+  for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, Reason::time_jump);
   while (auto next = timeline_.pop()) handle(*next, out);
 }
 
@@ -84,7 +84,7 @@ std::vector<Output> Estimator::finish() {
   std::vector<Output> out;
   timeline_.end();
   ended_ = true;
-  for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, "time jump");
+  for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, Reason::time_jump);
   while (auto next = timeline_.pop()) handle(*next, out);
   // A scan that ends between the last IMU sample and where the next would have been: the last sample is held.
   const Duration period = from_seconds(1.5 / robot_.imu.rate);
@@ -100,36 +100,13 @@ std::vector<Output> Estimator::finish() {
     if (last_output_) replay_.advance(*estimate_, std::max(estimate_->t, *last_output_ + Duration(1000)), &trajectory_);
     emit(out);
   }
-  for (const Pending& p : pending_) drop(p.sensor(), "no IMU");
+  for (const Pending& p : pending_) drop(p.sensor(), Reason::no_imu);
   pending_.clear();
-  for (const Measurement& m : before_start_) drop(sensor_of(m), "before the start");
+  for (const Measurement& m : before_start_) drop(sensor_of(m), Reason::before_start);
   before_start_.clear();
-  warn_of_unused_sensors();
-  warn_of_streams();
+  report_streams();
+  report_use({});
   return out;
-}
-
-// A sensor that was there and of little use is what the user must know of first.
-void Estimator::warn_of_unused_sensors() {
-  constexpr std::uint64_t few = 20;  // messages
-  const std::uint64_t legs = statistics_.sensors[static_cast<std::size_t>(Sensor::legs)].used;
-  // Even who runs has a foot on the ground for more than half of the time.
-  if (statistics_.unsupported > few && 2 * statistics_.unsupported > legs) {
-    statistics_.warnings.push_back("legs: no foot seemed to stand still in " + std::to_string(100 * statistics_.unsupported / legs) +
-                                   " % of the messages: is the mount of the IMU right, and the URDF this robot's?");
-  }
-  if (statistics_.maps_begun_anew > 0) {
-    statistics_.warnings.push_back("the map was begun anew " + std::to_string(statistics_.maps_begun_anew) +
-                                   " times, because sweeps had fitted nowhere: poses before and after do not belong together");
-  }
-  for (int i = 0; i < sensor_count; ++i) {
-    const SensorCount& sensor = statistics_.sensors[static_cast<std::size_t>(i)];
-    const auto weight = [](const auto& cause) { return cause.first == "before the start" || cause.first == "not used" ? 0 : cause.second; };
-    const auto worst = std::ranges::max_element(sensor.dropped, {}, weight);
-    if (worst == sensor.dropped.end() || weight(*worst) < few || 10 * weight(*worst) < sensor.used) continue;
-    statistics_.warnings.push_back(std::string(name_of(static_cast<Sensor>(i))) + ": " + std::to_string(worst->second) +
-                                   " messages could not be used: " + worst->first + "; " + std::to_string(sensor.used) + " were");
-  }
 }
 
 void Estimator::handle(Measurement& m, std::vector<Output>& out) {
@@ -145,7 +122,7 @@ void Estimator::handle(Measurement& m, std::vector<Output>& out) {
     wait_for_imu({std::move(*scan), begin, end});
   } else if (auto* image = std::get_if<CameraImage>(&m)) {
     const Time t = image->t;
-    if (const char* fault = image_fault(*image)) return drop(Sensor::camera, fault);
+    if (const auto fault = image_fault(*image)) return drop(Sensor::camera, *fault);
     wait_for_imu({std::move(*image), t, t});
   }
 }
@@ -154,7 +131,7 @@ void Estimator::wait_for_imu(Pending what) {
   const auto after = std::ranges::upper_bound(pending_, what.end, {}, &Pending::end);
   pending_.insert(after, std::move(what));
   if (pending_.size() <= max_pending) return;
-  drop(pending_.front().sensor(), "no IMU");
+  drop(pending_.front().sensor(), Reason::no_imu);
   pending_.pop_front();
 }
 
@@ -166,7 +143,7 @@ void Estimator::handle_before_start(Measurement& m, std::vector<Output>& out) {
   // A moving start looks this far back and no farther.
   const Time oldest = completion_of(before_start_.back()) - from_seconds(config_.initial.moving_start + 1.0);
   while (completion_of(before_start_.front()) < oldest) {
-    drop(sensor_of(before_start_.front()), "before the start");
+    drop(sensor_of(before_start_.front()), Reason::before_start);
     before_start_.pop_front();
   }
   if (start) begin(*start, out);
@@ -178,7 +155,7 @@ void Estimator::bound_images_before_start() {
   const auto is_image = [](const Measurement& m) { return std::holds_alternative<CameraImage>(m); };
   if (!is_image(before_start_.back()) || std::ranges::count_if(before_start_, is_image) <= most) return;
   before_start_.erase(std::ranges::find_if(before_start_, is_image));
-  drop(Sensor::camera, "before the start");
+  drop(Sensor::camera, Reason::before_start);
 }
 
 void Estimator::begin(const Start& start, std::vector<Output>& out) {
@@ -195,18 +172,15 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   // A sweep of an unknown velocity has no shape, and along a corridor nothing would show it. The legs tell the velocity within a step.
   constexpr Duration a_step = std::chrono::seconds(1);
   sweeps_from_ = start.still || !uses(Sensor::legs) ? start.estimate.t : start.estimate.t + a_step;
-  if (!start.still) statistics_.warnings.push_back("the robot did not stand still: started on the move, with wide uncertainties");
+  if (!start.still) report({}, Reason::moving_start);
   const double norm = start.resting_norm * start.accel_scale;
-  if (std::abs(norm - standard_gravity) > 0.1 * standard_gravity) {
-    statistics_.warnings.push_back("the accelerometer measured " + std::to_string(start.resting_norm) +
-                                   " at the start: neither 9.8 m/s^2 nor 1 g");
-  }
+  if (std::abs(norm - standard_gravity) > 0.1 * standard_gravity) report(Sensor::imu, Reason::strange_gravity, start.resting_norm);
   // Since the robot stood still, what came during the window is as good as what comes now.
   std::deque<Measurement> waiting;
   waiting.swap(before_start_);
   for (Measurement& m : waiting) {
     if (completion_of(m) < estimate_->t) {
-      drop(sensor_of(m), "before the start");
+      drop(sensor_of(m), Reason::before_start);
     } else {
       handle(m, out);
     }
@@ -217,6 +191,7 @@ bool Estimator::keep_finite(bool definite) {
   if (is_sane(*estimate_) && (!definite || is_definite(estimate_->P))) return true;
   // Back to the last good state; where the robot went since, nobody knows.
   const Time t = estimate_->t;
+  const double lost = to_seconds(t - anchor_.t);
   anchor_.t = t;
   anchor_.x.v.setZero();
   anchor_.P.diagonal().segment<3>(at::v).array() += 1.0;
@@ -229,6 +204,7 @@ bool Estimator::keep_finite(bool definite) {
   ++statistics_.rollbacks;
   trajectory_.clear();
   trajectory_.push(t, estimate_->x.pose(), estimate_->x.v);
+  report({}, Reason::state_thrown_away, lost);
   return false;
 }
 
@@ -263,6 +239,7 @@ Output Estimator::output_now() {
   if (replay_.has_imu()) o.omega = replay_.newest_imu().gyro - o.x.bg;
   o.modality = modality_;
   o.cause = cause_;
+  if (events_.has_news()) o.events = events_.take();
   return o;
 }
 

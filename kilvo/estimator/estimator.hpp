@@ -57,6 +57,8 @@ class Estimator {
   std::optional<std::string> mismatch(const JointSample& s) const { return kinematics_ ? kinematics_->mismatch(s) : std::nullopt; }
 
   const Statistics& statistics() const { return statistics_; }
+  /// Events that no output has carried: after finish(), or before the first output.
+  std::vector<Event> take_events() { return events_.take(); }
   /// Of the messages as they have arrived until now.
   const Health& health() const { return health_; }
   const VoxelMap& map() const { return map_; }
@@ -78,14 +80,26 @@ class Estimator {
   void begin(const Start& start, std::vector<Output>& out);
   void wait_for_imu(Pending what);
   void bound_images_before_start();
-  void warn_of_unused_sensors();
-  void drop(Sensor s, const std::string& cause) { ++statistics_.sensors[static_cast<std::size_t>(s)].dropped[cause]; }
   bool uses(Sensor s) const { return used_[static_cast<std::size_t>(s)]; }
   bool keep_finite(bool definite = false);  // `definite`: looks at the whole covariance
   Output output_now();                      // with what a sweep and an image left to go out
   void emit(std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0, double contact_us = 0);
 
   void note_clock_step();
+
+  // findings.cpp: what is reported beside the states
+  struct Use {
+    std::array<std::uint64_t, sensor_count> used{};
+    std::array<std::array<std::uint64_t, reason_count>, sensor_count> dropped{};
+    std::uint64_t unsupported = 0;
+  };
+  Time now() const;
+  void report(std::optional<Sensor> sensor, Reason reason, double value = 0, std::string detail = {});
+  void drop(Sensor sensor, Reason reason, const std::string& text = {});  // `text`: more exact than the reason's
+  void change_modality(Modality modality, Reason cause);
+  void look_at_streams(Time t);
+  void report_streams();
+  void report_use(const Use& before);
 
   // asynchronous.cpp: IMU and legs
   void handle_imu(ImuSample s, std::vector<Output>& out);
@@ -95,6 +109,7 @@ class Estimator {
   // switching.cpp: which sensors are used, and how they come back
   void inflate_velocity_covariance();
   void choose_modality(Time t);
+  Reason cause_of_change(Time t, Modality now) const;
   void lose_imu(std::vector<Output>& out);
   void bridge(Time silent_since, std::vector<Output>& out);
   void lose_legs(Time t);
@@ -105,7 +120,6 @@ class Estimator {
   bool may_learn(const Estimate& prior, const RegistrationReport& report);
   void refuse_sweep(Time t);
   void note_outage(Time sweep_begin);
-  void warn_of_streams();
 
   // sequential.cpp: sweeps
   void process_pending(Time until, std::vector<Output>& out);
@@ -123,7 +137,7 @@ class Estimator {
   void move_clock(Sensor s, double by);
 
   // images.cpp
-  const char* image_fault(const CameraImage& image);
+  std::optional<Reason> image_fault(const CameraImage& image);
   std::optional<SE3> camera_from_state(Time image) const;
   void process(const CameraImage& image);
   void note_drift(std::span<const PhotometricModel::FrameShare> shares, const SE3& T_WI);
@@ -176,21 +190,24 @@ class Estimator {
   double leg_period_ = 0;          // between the last two leg samples, s
   double closing_us_ = 0;          // what it took to close the IMU's intervals since the last leg sample
   TimeOffset lidar_clock_;
-  std::array<Duration, sensor_count> shift_{};                          // found, and added to the stamps, by Sensor
-  std::array<std::optional<std::size_t>, sensor_count> shift_is_said_;  // by which of the warnings
-  Time last_used_stance_{};                                             // when a foot was used last
-  Time last_stance_{};                                                  // the same, or since when that is waited for
-  Time last_sweep_{};                                                   // end of the last sweep, or the start
-  Time last_middle_{};                                                  // of the last sweep
-  std::optional<Time> last_image_;                                      // that was used
-  Eigen::Vector3d last_image_p_ = Eigen::Vector3d::Zero();              // m
+  std::array<Duration, sensor_count> shift_{};              // found, and added to the stamps, by Sensor
+  Time last_used_stance_{};                                 // when a foot was used last
+  Time last_stance_{};                                      // the same, or since when that is waited for
+  Time last_sweep_{};                                       // end of the last sweep, or the start
+  Time last_middle_{};                                      // of the last sweep
+  std::optional<Time> last_image_;                          // that was used
+  Eigen::Vector3d last_image_p_ = Eigen::Vector3d::Zero();  // m
   Modality modality_ = Modality::coast;
-  const char* cause_ = "start";
+  Reason cause_ = Reason::start;
   ClockSteps clock_steps_;
   Health health_;
   StationarityDetector stationarity_;
   Recovery recovery_;
   Statistics statistics_;
+  EventLog events_;
+  std::array<std::array<std::uint64_t, reason_count>, sensor_count> drops_{};  // by Sensor and Reason
+  Use used_before_;
+  Time streams_looked_at_{}, use_looked_at_{};
 };
 
 }  // namespace kilvo

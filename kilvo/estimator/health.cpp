@@ -80,24 +80,24 @@ bool Health::repeats(const Measurement& m, Tracker& tracker) {
 }
 
 // Repeated values carry nothing new. Of a sensor that never repeats itself they are not used, and enough of them mean that it is frozen.
-const char* Health::judge_repeats(const Measurement& m, StreamHealth& stream, Tracker& tracker) {
+std::optional<Reason> Health::judge_repeats(const Measurement& m, StreamHealth& stream, Tracker& tracker) {
   const Time t = stamp_of(m);
   if (!repeats(m, tracker)) {
     tracker.same = 0;
     tracker.frozen = false;
     tracker.different = std::min(alive, tracker.different + 1);
-    return nullptr;
+    return std::nullopt;
   }
   ++stream.repeated;
   if (tracker.same++ == 0) tracker.same_since = t;
   bool frozen = false;
   switch (sensor_of(m)) {
     case Sensor::imu:
-      if (tracker.different < alive) return tracker.different = 0, nullptr;
+      if (tracker.different < alive) return tracker.different = 0, std::nullopt;
       frozen = tracker.same >= imu_same;
       break;
     case Sensor::legs:
-      if (imu_motion_ < moving && !tracker.frozen) return tracker.same = 0, nullptr;
+      if (imu_motion_ < moving && !tracker.frozen) return tracker.same = 0, std::nullopt;
       frozen = to_seconds(t - tracker.same_since) > legs_same;
       break;
     case Sensor::lidar:
@@ -108,10 +108,11 @@ const char* Health::judge_repeats(const Measurement& m, StreamHealth& stream, Tr
       break;
   }
   if (frozen && !std::exchange(tracker.frozen, true)) ++stream.frozen;
-  if (tracker.frozen) return "frozen";
+  if (tracker.frozen) return Reason::frozen;
   // A pair of equal IMU samples may be a driver's; leg messages may come faster than the encoders are read.
   const bool may_be = sensor_of(m) == Sensor::legs || (sensor_of(m) == Sensor::imu && tracker.same < 2);
-  return may_be ? nullptr : sensor_of(m) == Sensor::camera ? "the same picture again" : "the same values again";
+  if (may_be) return std::nullopt;
+  return sensor_of(m) == Sensor::camera ? Reason::repeated_image : Reason::repeated_values;
 }
 
 // The IMU is the clock. A stamp may lie ahead of it because the IMU is silent or late, with all others; or because that clock is wrong:
@@ -167,20 +168,20 @@ void Health::watch_imu(const Measurement& m) {
   imu_silence_ = std::max(imu_silence_, std::min(1.0, to_seconds(*tracker.stamp - since)));
 }
 
-const char* Health::judge(const Measurement& m) {
+std::optional<Reason> Health::judge(const Measurement& m) {
   const Sensor s = sensor_of(m);
   StreamHealth& stream = streams_[m.index()];
   Tracker& tracker = trackers_[m.index()];
   const Time t = completion_of(m);
   // Duplicates and what comes late, between newer ones, are the timeline's business.
-  if (tracker.stamp && t <= *tracker.stamp && *tracker.stamp - t < jump) return nullptr;
-  if (const char* same = judge_repeats(m, stream, tracker)) {
+  if (tracker.stamp && t <= *tracker.stamp && *tracker.stamp - t < jump) return std::nullopt;
+  if (const auto same = judge_repeats(m, stream, tracker)) {
     ++stream.messages;
     return same;
   }
   if (s != Sensor::imu && is_ahead(s, t, stream, tracker)) {
     ++stream.messages;
-    return "its clock is ahead of the IMU's";
+    return Reason::clock_ahead;
   }
   if (const auto* imu = std::get_if<ImuSample>(&m)) {
     stream.clipped += is_clipped(imu_, *imu) ? 1 : 0;
@@ -188,7 +189,7 @@ const char* Health::judge(const Measurement& m) {
   }
   time(stream, tracker, t);
   watch_imu(m);
-  return nullptr;
+  return std::nullopt;
 }
 
 }  // namespace kilvo

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "kilvo/estimator/reason.hpp"
 #include "kilvo/sensors/measurement.hpp"
 #include "kilvo/sensors/robot.hpp"
 
@@ -27,8 +28,8 @@ class Health {
  public:
   explicit Health(const Robot& robot);
 
-  /// Looks at a message as it arrives. Says why it is not to be used; nullptr when nothing speaks against it.
-  const char* judge(const Measurement& m);
+  /// Looks at a message as it arrives. Says why it is not to be used; none when nothing speaks against it.
+  std::optional<Reason> judge(const Measurement& m);
 
   const std::array<StreamHealth, sensor_count>& streams() const { return streams_; }
   /// The newest stamp of a sensor.
@@ -51,7 +52,7 @@ class Health {
   };
   void time(StreamHealth& stream, Tracker& tracker, Time t);
   bool repeats(const Measurement& m, Tracker& tracker);
-  const char* judge_repeats(const Measurement& m, StreamHealth& stream, Tracker& tracker);
+  std::optional<Reason> judge_repeats(const Measurement& m, StreamHealth& stream, Tracker& tracker);
   bool is_ahead(Sensor s, Time t, StreamHealth& stream, Tracker& tracker);
   void watch_imu(const Measurement& m);
 

@@ -37,17 +37,17 @@ TEST(Health, AFrozenImuIsSaidWithin20SamplesAndIsAliveWhenItSpeaksAgain) {
   Health health{Robot{}};
   Stream stream(true);
   ImuSample last;
-  for (int i = 0; i < 100; ++i) EXPECT_EQ(health.judge(last = stream.next()), nullptr);
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(health.judge(last = stream.next()), std::nullopt);
   int used = 0;
   for (int i = 0; i < 20; ++i) {
     last.t += milliseconds(5);
-    used += health.judge(last) == nullptr ? 1 : 0;
+    used += health.judge(last) ? 0 : 1;
   }
   EXPECT_LE(used, 1);
   EXPECT_TRUE(health.is_frozen(Sensor::imu));
   ImuSample alive = stream.next();
   alive.t = last.t + milliseconds(5);
-  EXPECT_EQ(health.judge(alive), nullptr);
+  EXPECT_EQ(health.judge(alive), std::nullopt);
   EXPECT_FALSE(health.is_frozen(Sensor::imu));
 }
 
@@ -56,7 +56,7 @@ TEST(Health, AnImuWithoutNoiseIsNotFrozen) {
   ImuSample s;
   for (int i = 0; i < 500; ++i) {
     s.t += milliseconds(5);
-    EXPECT_EQ(health.judge(s), nullptr);
+    EXPECT_EQ(health.judge(s), std::nullopt);
   }
 }
 
@@ -66,7 +66,7 @@ TEST(Health, LegsThatSayTheSameAreFrozenOnlyWhileTheImuMoves) {
     Stream stream(moving);
     for (int i = 0; i < 400; ++i) {
       const ImuSample s = stream.next();
-      EXPECT_EQ(health.judge(s), nullptr);
+      EXPECT_EQ(health.judge(s), std::nullopt);
       for (int k = 1; k < 5; ++k) health.judge(legs_at(s.t + milliseconds(k)));
     }
     EXPECT_EQ(health.is_frozen(Sensor::legs), moving);

@@ -33,21 +33,23 @@ SE3 as_the_map_has_it(const State& before, const State& after, const PoseCovaria
 
 }  // namespace
 
-// What makes an image no use at all; nullptr: nothing.
-const char* Estimator::image_fault(const CameraImage& image) {
+// What makes an image no use at all; none: nothing.
+std::optional<Reason> Estimator::image_fault(const CameraImage& image) {
   const Image& picture = image.image;
   if (picture.width != robot_.camera.width || picture.height != robot_.camera.height) {
+    const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
     if (!std::exchange(size_is_doubted_, true)) {
-      statistics_.warnings.push_back("camera: images of " + std::to_string(picture.width) + " x " + std::to_string(picture.height) +
-                                     " pixels cannot be used: camera.width and camera.height say " + std::to_string(robot_.camera.width) +
-                                     " x " + std::to_string(robot_.camera.height));
+      report(Sensor::camera, Reason::foreign_images, 0,
+             size(picture.width, picture.height) + " pixels cannot be used: camera.width and camera.height say " +
+                 size(robot_.camera.width, robot_.camera.height));
     }
-    return "another size than configured";
+    return Reason::image_size;
   }
-  if (picture.channels != 1 && picture.channels != 3) return "neither grey nor colour";
+  if (picture.channels != 1 && picture.channels != 3) return Reason::image_channels;
   const std::size_t values =
       static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height) * static_cast<std::size_t>(picture.channels);
-  return picture.pixels.size() == values ? nullptr : "cut short";
+  if (picture.pixels.size() == values) return std::nullopt;
+  return Reason::image_cut;
 }
 
 // Where the camera was when the image was taken, seen from the IMU at the time of the state that it updates. That is the image's own time,
@@ -61,22 +63,22 @@ std::optional<SE3> Estimator::camera_from_state(Time image) const {
 }
 
 void Estimator::process(const CameraImage& image) {
-  if (mount_is_doubted_) return drop(Sensor::camera, "not mounted as configured");
+  if (mount_is_doubted_) return drop(Sensor::camera, Reason::mount_doubted);
   const std::optional<SE3> T_CI = camera_from_state(image.t);
-  if (!T_CI) return drop(Sensor::camera, "before the state");
-  if (replay_.is_blind(image.t, image.t)) return drop(Sensor::camera, "no IMU");
-  if (image.t < images_from_) return drop(Sensor::camera, "before the motion is known");
-  if (seen_W_.empty()) return drop(Sensor::camera, "before the first sweep");
+  if (!T_CI) return drop(Sensor::camera, Reason::before_state);
+  if (replay_.is_blind(image.t, image.t)) return drop(Sensor::camera, Reason::no_imu);
+  if (image.t < images_from_) return drop(Sensor::camera, Reason::before_motion);
+  if (seen_W_.empty()) return drop(Sensor::camera, Reason::before_sweep);
   // Vision lives by the surfaces of the LiDAR: without it, nobody can tell what hides what, and images can only drift.
   constexpr int scans = 3;
-  if (image.t - last_middle_ > from_seconds((scans + 0.5) / robot_.lidar.rate)) return drop(Sensor::camera, "no LiDAR");
-  if (recovery_.sweeps_to_go > 0) return drop(Sensor::camera, "before the map is joined again");
+  if (image.t - last_middle_ > from_seconds((scans + 0.5) / robot_.lidar.rate)) return drop(Sensor::camera, Reason::no_lidar);
+  if (recovery_.sweeps_to_go > 0) return drop(Sensor::camera, Reason::before_rejoined);
   Stopwatch watch;
   const std::vector<GreyImage> pyramid = pyramid_of(to_grey(image.image), Patch::levels);
   const Time at = std::max(image.t, anchor_.t);
   Estimate prior = replay_.nearest(at, anchor_);
   replay_.advance(prior, at, &trajectory_);
-  if (is_lost_among_patches(prior)) return drop(Sensor::camera, "the pose is too uncertain");
+  if (is_lost_among_patches(prior)) return drop(Sensor::camera, Reason::pose_uncertain);
   const SE3 expected = *T_CI * prior.x.pose().inverse();
   const DepthView depth(*camera_, expected, seen_W_);
   const std::vector<PatchCandidate> tracks = select_patches(visual_map_, *camera_, expected, depth, config_.vision);
@@ -104,13 +106,13 @@ void Estimator::process(const CameraImage& image) {
     return info;
   };
   estimate_ = tracks.empty() ? prior : update(prior, measured, update_config).posterior;
-  if (!keep_finite(true)) return drop(Sensor::camera, "not finite");
+  if (!keep_finite(true)) return drop(Sensor::camera, Reason::not_finite);
   const Eigen::Vector3d omega = replay_.gyro_at(image.t).value_or(prior.x.bg) - prior.x.bg;
   if (at == image.t) check_mount(model, prior.x.R, omega);
   if (says_nothing(model.report())) {
     estimate_ = prior_before_exposure;
     rebase(*estimate_);
-    return drop(Sensor::camera, "agrees with nothing");
+    return drop(Sensor::camera, Reason::agrees_with_nothing);
   }
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::camera)].used;
   trajectory_.correct(at, estimate_->x.pose(), estimate_->x.v - prior.x.v);
@@ -187,10 +189,8 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI, cons
   mount_is_doubted_ = true;
   const auto tenths = [](double value) { return decimals(value, 1); };
   const Eigen::Vector3d degrees = *psi * (180 / M_PI);
-  statistics_.warnings.push_back("the images fit a camera that is turned by " + tenths(degrees.norm()) + " degrees or more (" +
-                                 tenths(degrees.x()) + ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()) +
-                                 " about the axes of the IMU) against camera.T_imu_camera.R: is the calibration that of this robot, and "
-                                 "camera.time_offset right? Images are not used any more");
+  report(Sensor::camera, Reason::camera_turned, degrees.norm(),
+         tenths(degrees.x()) + ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()));
 }
 
 void Estimator::learn_from(const SE3& T_CI, const PhotometricModel& model, std::span<const PatchCandidate> tracks,

@@ -104,7 +104,7 @@ std::uint64_t used(const Drive& r, Sensor s) { return r.statistics.sensors[stati
 std::vector<std::string> modalities(const Drive& r) {
   std::vector<std::string> out;
   for (const Output& o : r.outputs) {
-    const std::string now = std::string(name_of(o.modality)) + ", " + o.cause;
+    const std::string now = std::string(name_of(o.modality)) + ", " + text_of(o.cause);
     if (out.empty() || out.back() != now) out.push_back(now);
   }
   return out;
@@ -241,7 +241,7 @@ TEST(Legs, OfAnotherMountAreSaidAndDoNotSpoilWhatTheLidarSees) {
   expect_sane(r);
   EXPECT_LT(r.worst_position, 0.05);
   EXPECT_GT(r.statistics.unsupported, used(r, Sensor::legs) / 2);
-  EXPECT_TRUE(std::ranges::any_of(r.statistics.warnings, [](const std::string& w) { return w.find("mount") != std::string::npos; }));
+  EXPECT_TRUE(std::ranges::any_of(warnings_of(r.statistics), [](const std::string& w) { return w.find("mount") != std::string::npos; }));
 }
 
 TEST(Legs, ThatNeverSpeakAreLostAfter50Milliseconds) {

@@ -30,7 +30,7 @@ void LivePropagator::miss_legs() {
   last_legs_.reset();
   if (!has_legs(modality_)) return;
   modality_ = without_legs(modality_);
-  cause_ = "legs lost";
+  cause_ = Reason::legs_lost;
 }
 
 // What is not finite goes nowhere: it is silent until the estimator, which throws such a state away, is forked again.
@@ -40,7 +40,7 @@ bool LivePropagator::keep_finite() {
 }
 
 bool LivePropagator::push(const ImuSample& raw) {
-  if (!started_ || imu_lost_ || fault_of(raw) != nullptr) return false;
+  if (!started_ || imu_lost_ || fault_of(raw)) return false;
   const Time newest = replay_.newest_imu().t;
   // Whether its clock has jumped or the IMU was silent is for the estimator to find out.
   if (raw.t <= newest || to_seconds(raw.t - newest) > blind_gap) return false;

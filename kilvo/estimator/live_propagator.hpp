@@ -55,7 +55,7 @@ class LivePropagator {
   std::optional<Time> last_legs_;  // while the legs are used
   double leg_period_ = 0;          // s
   Modality modality_ = Modality::coast;
-  const char* cause_ = "start";
+  Reason cause_ = Reason::start;
   PoseCovariance map_error_ = PoseCovariance::Zero();
 
   Duration lag_{};                            // see expect_legs_after

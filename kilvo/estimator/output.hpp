@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "kilvo/estimator/degradation.hpp"
+#include "kilvo/estimator/event.hpp"
 #include "kilvo/estimator/health.hpp"
 #include "kilvo/estimator/modality.hpp"
 #include "kilvo/filter/state.hpp"
@@ -33,7 +34,7 @@ struct Output {
   Covariance P = Covariance::Zero();                // of the error relative to the first pose (state.hpp: at)
   Eigen::Vector3d omega = Eigen::Vector3d::Zero();  // bias-free angular rate of the newest IMU sample, in the IMU frame, rad/s
   Modality modality = Modality::coast;
-  const char* cause = "start";        // of the last change of modality
+  Reason cause = Reason::start;       // of the last change of modality
   bool is_sweep = false;              // state after the last update of a sweep
   bool is_image = false;              // state after the update of an image
   std::optional<Contacts> contacts;   // of each leg sample
@@ -41,6 +42,7 @@ struct Output {
   double contact_us = 0;              // the contacts' part of it
   StageTimes stages;                  // of a sweep, of an image
   std::vector<Indicator> indicators;  // of a sweep, of an image
+  std::vector<Event> events;          // that became true since the output before
   // Only of sweeps:
   std::vector<PointXYZI> points_W;  // undistorted, in the world
   RegistrationReport registration;
@@ -67,7 +69,10 @@ struct Statistics {
   std::uint64_t searches = 0, found = 0;           // sweeps whose pose was searched for, and found
   std::uint64_t maps_begun_anew = 0;               // because sweeps had fitted nowhere for long
   bool diverged = false;
-  std::vector<std::string> warnings;  // each said once
+  std::vector<Event> events;  // one for each sensor and reason, as it was last
 };
+
+/// The sentences of those events that are more than notices.
+std::vector<std::string> warnings_of(const Statistics& statistics);
 
 }  // namespace kilvo

@@ -84,8 +84,8 @@ bool Estimator::has_no_shape(const Estimate& prior) const {
 }
 
 void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& out) {
-  if (end < anchor_.t) return drop(Sensor::lidar, "before the state");
-  if (replay_.is_blind(begin_of(scan), end)) return drop(Sensor::lidar, "no IMU");
+  if (end < anchor_.t) return drop(Sensor::lidar, Reason::before_state);
+  if (replay_.is_blind(begin_of(scan), end)) return drop(Sensor::lidar, Reason::no_imu);
   note_outage(begin_of(scan));
   Stopwatch watch;
   // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
@@ -95,9 +95,9 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   replay_.advance(prior, centre, &trajectory_);
   Estimate ahead = replay_.nearest(end, prior);
   replay_.advance(ahead, end, &trajectory_);
-  if (end < sweeps_from_ && has_no_shape(prior)) return drop(Sensor::lidar, "before the motion is known");
+  if (end < sweeps_from_ && has_no_shape(prior)) return drop(Sensor::lidar, Reason::before_motion);
   const std::vector<PointXYZI> points = undistort(scan, trajectory_, centre, robot_.lidar, statistics_.points);
-  if (points.empty()) return drop(Sensor::lidar, "no usable point");
+  if (points.empty()) return drop(Sensor::lidar, Reason::no_usable_point);
   const std::vector<PointCluster> clusters = downsample(points, prior.x.pose(), config_.lidar.voxel_size, config_.lidar.reach());
   const Eigen::Vector3d p_IL = robot_.lidar.T_imu_lidar.p;
   LidarConfig lidar = config_.lidar;

@@ -1,10 +1,7 @@
 // Which sensors are used, and how they come back: all decisions on modality are here.
 #include <algorithm>
 #include <cmath>
-#include <string>
-#include <string_view>
 
-#include "kilvo/estimator/decimals.hpp"
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/estimator/silence.hpp"
 #include "kilvo/filter/update.hpp"
@@ -34,8 +31,6 @@ bool contradicts_map(const RegistrationReport& report) {
   return met > known_share * report.clusters && report.matched < agreeing_share * met;
 }
 
-std::string milliseconds_of(double seconds) { return decimals(1e3 * seconds, 0) + " ms"; }
-
 }  // namespace
 
 void Estimator::choose_modality(Time t) {
@@ -45,25 +40,26 @@ void Estimator::choose_modality(Time t) {
   const bool camera = lidar && last_image_ && t - *last_image_ <= silence(robot_.camera.rate, 3, std::chrono::milliseconds(300));
   const Modality with_legs = lidar ? (camera ? Modality::kilv : Modality::kil) : Modality::ki;
   const Modality now = legs ? with_legs : without_legs(with_legs);
-  const bool after_outage = std::string_view(cause_).starts_with("imu ") && cause_ != std::string_view("imu is back");
-  if (after_outage) cause_ = "imu is back";
-  if (now == modality_) return;
-  if (!after_outage && (modality_ != Modality::coast || cause_ != std::string_view("start"))) {
-    if (lidar != has_lidar(modality_)) {
-      cause_ = lidar ? "lidar is back" : health_.is_frozen(Sensor::lidar) ? "lidar frozen" : "lidar lost";
-    } else if (legs != has_legs(modality_)) {
-      cause_ = legs ? "legs are back" : health_.is_frozen(Sensor::legs) ? "legs frozen" : "legs lost";
-    } else {
-      const auto heard = health_.heard(Sensor::camera);
-      const bool silent = !heard || t - *heard > silence(robot_.camera.rate, 3, std::chrono::milliseconds(300));
-      cause_ = camera                              ? "images are used"
-               : health_.is_frozen(Sensor::camera) ? "camera frozen"
-               : silent                            ? "camera lost"
-                                                   : "images tell nothing";
-    }
+  const bool after_outage = cause_ == Reason::imu_lost || cause_ == Reason::imu_frozen;
+  if (after_outage) cause_ = Reason::imu_back;
+  if (now == modality_) {
+    if (after_outage) report({}, cause_);
+    return;
   }
-  modality_ = now;
+  const bool first = modality_ == Modality::coast && cause_ == Reason::start;
+  change_modality(now, after_outage || first ? cause_ : cause_of_change(t, now));
   if (now == Modality::coast && pending_.empty()) inflate_velocity_covariance();
+}
+
+Reason Estimator::cause_of_change(Time t, Modality now) const {
+  if (has_lidar(now) != has_lidar(modality_))
+    return has_lidar(now) ? Reason::lidar_back : health_.is_frozen(Sensor::lidar) ? Reason::lidar_frozen : Reason::lidar_lost;
+  if (has_legs(now) != has_legs(modality_))
+    return has_legs(now) ? Reason::legs_back : health_.is_frozen(Sensor::legs) ? Reason::legs_frozen : Reason::legs_lost;
+  if (has_camera(now)) return Reason::camera_used;
+  const auto heard = health_.heard(Sensor::camera);
+  const bool silent = !heard || t - *heard > silence(robot_.camera.rate, 3, std::chrono::milliseconds(300));
+  return health_.is_frozen(Sensor::camera) ? Reason::camera_frozen : silent ? Reason::camera_lost : Reason::camera_useless;
 }
 
 // What has failed may have been wrong before it was missed, and nothing will tell.
@@ -78,8 +74,7 @@ void Estimator::lose_imu(std::vector<Output>& out) {
   if (!estimate_ || recovery_.imu_lost) return;
   recovery_.imu_lost = true;
   ++statistics_.imu_outages;
-  modality_ = Modality::coast;
-  cause_ = health_.is_frozen(Sensor::imu) ? "imu frozen" : "imu lost";
+  change_modality(Modality::coast, health_.is_frozen(Sensor::imu) ? Reason::imu_frozen : Reason::imu_lost);
   const Estimate kept = *estimate_;
   inflate_covariance_over_gap(*estimate_, kept.t, kept.t + from_seconds(blind_gap), blind_gap);
   estimate_->t = std::max(kept.t, last_output_.value_or(kept.t) + Duration(1000));
@@ -199,7 +194,7 @@ bool Estimator::register_sweep(const Estimate& prior, LidarModel& model, const s
 
 // A sweep that fits nowhere is not used; when that has lasted, the robot is taken to be outside of the map: it begins anew around it.
 void Estimator::refuse_sweep(Time t) {
-  drop(Sensor::lidar, "fits nowhere in the map");
+  drop(Sensor::lidar, Reason::fits_nowhere);
   if (!recovery_.refused_since) recovery_.refused_since = t;
   recovery_.sweeps_to_go = consistent_sweeps;
   if (map_is_given_ || t - *recovery_.refused_since < longest_refusal) return;
@@ -209,6 +204,7 @@ void Estimator::refuse_sweep(Time t) {
   recovery_.refused_since.reset();
   recovery_.sweeps_to_go = 0;
   ++statistics_.maps_begun_anew;
+  report(Sensor::lidar, Reason::map_begun_anew);
 }
 
 // After an outage the map is re-joined, not smeared: it grows again when sweeps have agreed with the prediction some times, or where it has
@@ -231,24 +227,6 @@ void Estimator::note_outage(Time sweep_begin) {
   constexpr int periods = 4;
   if (last_middle_ != Time{} && sweep_begin - last_sweep_ > from_seconds(periods / robot_.lidar.rate))
     recovery_.sweeps_to_go = std::max(recovery_.sweeps_to_go, consistent_sweeps);
-}
-
-// What the streams themselves showed; what could not be used is said elsewhere.
-void Estimator::warn_of_streams() {
-  statistics_.health = health_.streams();
-  const auto say = [this](std::size_t s, const std::string& text) {
-    statistics_.warnings.push_back(std::string(name_of(static_cast<Sensor>(s))) + ": " + text);
-  };
-  for (std::size_t s = 0; s < sensor_count; ++s) {
-    const StreamHealth& stream = statistics_.health[s];
-    if (stream.off_clock > 4) {
-      say(s, "its clock is " + milliseconds_of(stream.clock_offset) + " ahead of the IMU's: " + std::to_string(stream.off_clock) +
-                 " messages were not used");
-    }
-    constexpr double late = 0.25;  // s
-    if (stream.mean_lag > late) say(s, "its messages come " + milliseconds_of(stream.mean_lag) + " after the IMU's of the same time");
-    if (stream.frozen > 0) say(s, "frozen " + std::to_string(stream.frozen) + " times: it kept saying the same");
-  }
 }
 
 }  // namespace kilvo

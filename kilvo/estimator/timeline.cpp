@@ -28,7 +28,7 @@ void Timeline::end() {
   ended_ = true;
 }
 
-std::optional<std::string> Timeline::push(Measurement m) {
+std::optional<Reason> Timeline::push(Measurement m) {
   constexpr Duration jump = std::chrono::seconds(1);
   constexpr std::size_t witnesses = 10;
   const Time key = completion_of(m);
@@ -46,14 +46,14 @@ std::optional<std::string> Timeline::push(Measurement m) {
   return std::nullopt;
 }
 
-std::optional<std::string> Timeline::admit(Measurement m, Time key) {
+std::optional<Reason> Timeline::admit(Measurement m, Time key) {
   const Time stamp = stamp_of(m);
   const auto s = static_cast<std::size_t>(sensor_of(m));
-  if (stamp_[s] == stamp) return "duplicate";
+  if (stamp_[s] == stamp) return Reason::duplicate;
   const Sensor sensor = sensor_of(m);
   // What is fused at its own time may come after others.
   const Duration patience = sensor == Sensor::lidar || sensor == Sensor::camera ? max_wait_ : Duration(0);
-  if (released_ && key < *released_ - patience) return "late";
+  if (released_ && key < *released_ - patience) return Reason::late;
   if (!newest_[s] || key > *newest_[s]) {
     note_spacing(s, key);
     newest_[s] = key;

@@ -8,11 +8,11 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
+#include "kilvo/estimator/reason.hpp"
 #include "kilvo/sensors/measurement.hpp"
 
 namespace kilvo {
@@ -28,10 +28,10 @@ class Timeline {
   Timeline(std::array<bool, sensor_count> expected, Duration max_wait, bool wait_for_images = true)
       : expected_(expected), max_wait_(max_wait), wait_for_images_(wait_for_images) {}
 
-  /// Takes the measurement, or says why not ("late", "duplicate"). Scans and images may come up to max_wait after others of their time have
+  /// Takes the measurement, or says why not (late, duplicate). Scans and images may come up to max_wait after others of their time have
   /// been released: they go next. One that is over a second ahead of all others is kept apart: if the
   /// next ones are there as well, time has really passed; if not, its clock was wrong (take_jumped).
-  std::optional<std::string> push(Measurement m);
+  std::optional<Reason> push(Measurement m);
 
   /// Sensors of the measurements that turned out to be ahead by mistake, since the last call.
   std::vector<Sensor> take_jumped() { return std::exchange(jumped_, {}); }
@@ -47,7 +47,7 @@ class Timeline {
   bool is_awaited(std::size_t s, Time key) const;
   void note_spacing(std::size_t s, Time key);
   void give_up_suspects();
-  std::optional<std::string> admit(Measurement m, Time key);
+  std::optional<Reason> admit(Measurement m, Time key);
 
   std::array<bool, sensor_count> expected_;
   std::array<std::optional<Time>, sensor_count> newest_;

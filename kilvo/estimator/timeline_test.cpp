@@ -76,9 +76,9 @@ TEST(Timeline, ALateScanOrImageGoesNext) {
   EXPECT_EQ(all_from(timeline).size(), 2u);
   EXPECT_FALSE(timeline.push(image));
   EXPECT_EQ(all_from(timeline), (std::vector<double>{0.9}));
-  EXPECT_EQ(timeline.push(imu_at(0.99)), "late");
+  EXPECT_EQ(timeline.push(imu_at(0.99)), Reason::late);
   image.t -= from_seconds(0.2);
-  EXPECT_EQ(timeline.push(image), "late");
+  EXPECT_EQ(timeline.push(image), Reason::late);
 }
 
 TEST(Timeline, WaitsForASilentSensorNoLongerThanMaxWait) {
@@ -114,9 +114,9 @@ TEST(Timeline, SortsSwappedNeighbours) {
 TEST(Timeline, RefusesDuplicatesAndWhatIsOlderThanWhatIsOut) {
   Timeline timeline({true, false, false, false}, from_seconds(0.2));
   EXPECT_FALSE(timeline.push(imu_at(1.0)));
-  EXPECT_EQ(timeline.push(imu_at(1.0)), "duplicate");
+  EXPECT_EQ(timeline.push(imu_at(1.0)), Reason::duplicate);
   EXPECT_EQ(all_from(timeline).size(), 1u);
-  EXPECT_EQ(timeline.push(imu_at(0.5)), "late");
+  EXPECT_EQ(timeline.push(imu_at(0.5)), Reason::late);
 }
 
 TEST(Timeline, OneStampFarAheadIsDroppedAndHurtsNobody) {

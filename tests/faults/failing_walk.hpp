@@ -37,7 +37,7 @@ struct Moment {
   double error = 0, sigma = 0, sigmas = 0, tilt_sigmas = 0;
   double step = 0;  // how far the estimate moved beyond the truth since the moment before, m
   Modality modality{};
-  std::string cause;
+  Reason cause = Reason::start;
 };
 
 struct Outcome {
@@ -74,7 +74,7 @@ struct Outcome {
     }
     return out;
   }
-  bool has_cause(const std::string& cause) const {
+  bool has_cause(Reason cause) const {
     return std::ranges::any_of(moments, [&](const Moment& m) { return m.cause == cause; });
   }
   Modality modality_at(double s) const {

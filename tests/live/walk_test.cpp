@@ -103,7 +103,8 @@ TEST(LiveWalk, ALostSensorIsSaidInTime) {
   using lab::FailureKind;
   const Lived lived = live_through(walk(), {{FailureKind::drop, Sensor::legs, 5, 6, 0}, {FailureKind::drop, Sensor::lidar, 7, 8, 0}});
   const auto said = [&lived](const char* cause) {
-    const auto first = std::ranges::find(lived.states, std::string_view(cause), [](const Output& o) { return std::string_view(o.cause); });
+    const auto first =
+        std::ranges::find(lived.states, std::string_view(cause), [](const Output& o) { return std::string_view(text_of(o.cause)); });
     return first == lived.states.end() ? 1e9 : to_seconds(first->t - walk().time(0));
   };
   // 50 ms, and 0.3 s after the last sweep.
@@ -160,7 +161,7 @@ TEST(LiveWalk, WithoutAnImuThereIsNoPoseAfterOneThatSaysSo) {
   }
   EXPECT_TRUE(during.empty()) << during.size();
   const auto lost =
-      std::ranges::find(lived.states, std::string_view("imu lost"), [](const Output& o) { return std::string_view(o.cause); });
+      std::ranges::find(lived.states, std::string_view("imu lost"), [](const Output& o) { return std::string_view(text_of(o.cause)); });
   ASSERT_NE(lost, lived.states.end());
   EXPECT_EQ(lost->modality, Modality::coast);
 }

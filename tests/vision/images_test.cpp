@@ -63,7 +63,7 @@ class Images : public testing::Test {
         sum += (o.x.p - (*T_WR * truth).p).squaredNorm();
         ++count;
         ++out.outputs[o.modality];
-        out.cause[o.modality] = o.cause;
+        out.cause[o.modality] = text_of(o.cause);
         out.coloured += o.coloured.size();
         if (!o.is_image) continue;
         const double exposure = lab::exposure_at(simulator_->config().camera, t);
@@ -101,7 +101,7 @@ TEST_F(Images, HelpAndTheExposureIsFollowed) {
   EXPECT_LT(with.worst_tau, 0.03);
   EXPECT_GT(with.outputs.at(Modality::liv), 9 * with.outputs.at(Modality::li));
   EXPECT_GT(with.coloured, 10000U);
-  EXPECT_THAT(with.statistics.warnings, testing::Not(testing::Contains(HasSubstr("turned"))));
+  EXPECT_THAT(warnings_of(with.statistics), testing::Not(testing::Contains(HasSubstr("turned"))));
 }
 
 TEST_F(Images, OfAClockThatIsOffAreShifted) {
@@ -111,7 +111,7 @@ TEST_F(Images, OfAClockThatIsOffAreShifted) {
     return true;
   });
   EXPECT_NEAR(late.statistics.clock_shift[camera], -0.015, 0.004) << "of small images, after ten seconds";
-  EXPECT_THAT(late.statistics.warnings, testing::Contains(HasSubstr("set camera.time_offset to")));
+  EXPECT_THAT(warnings_of(late.statistics), testing::Contains(HasSubstr("set camera.time_offset to")));
   EXPECT_EQ(drive(liv).statistics.clock_shift[camera], 0);
 }
 
@@ -180,7 +180,7 @@ TEST_F(Images, BadOnesAreCountedAndCostNothingButThemselves) {
 TEST_F(Images, ACameraTurnedByThreeDegreesIsSpokenOf) {
   for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)}) {
     const Drive d = drive(liv, {}, [&](Robot& r) { r.camera.T_imu_camera.R = SO3::Exp(3 * M_PI / 180 * axis) * r.camera.T_imu_camera.R; });
-    EXPECT_THAT(d.statistics.warnings, testing::Contains(HasSubstr("camera.T_imu_camera.R"))) << axis.transpose();
+    EXPECT_THAT(warnings_of(d.statistics), testing::Contains(HasSubstr("camera.T_imu_camera.R"))) << axis.transpose();
   }
 }
 

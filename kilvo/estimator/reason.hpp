@@ -1,0 +1,174 @@
+// Why something happened: a message was not used, the modality changed, a finding about a sensor became true. Every reason has one name (in
+// files) and one text (for people), both in the table below; decisions compare the enumerators.
+//
+// To add a reason: an enumerator, a row of the table in the same place (a static_assert holds the two together), and Estimator::report
+// where it becomes true.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace kilvo {
+
+enum class Reason : std::uint8_t {
+  // of a change of modality
+  start,
+  imu_lost,
+  imu_frozen,
+  imu_back,
+  legs_lost,
+  legs_frozen,
+  legs_back,
+  lidar_lost,
+  lidar_frozen,
+  lidar_back,
+  camera_lost,
+  camera_frozen,
+  camera_used,
+  camera_useless,
+  // of a message that is not used
+  not_used,
+  not_finite,
+  absurd_value,
+  absurd_stamp,
+  empty,
+  duplicate,
+  late,
+  time_jump,
+  clock_back,
+  clock_forward,
+  clock_ahead,
+  repeated_values,
+  repeated_image,
+  frozen,
+  before_start,
+  before_state,
+  before_motion,
+  before_sweep,
+  before_rejoined,
+  no_imu,
+  no_lidar,
+  not_calm,
+  wrong_joints,
+  no_usable_point,
+  fits_nowhere,
+  image_size,
+  image_channels,
+  image_cut,
+  mount_doubted,
+  pose_uncertain,
+  agrees_with_nothing,
+  // findings
+  moving_start,
+  strange_gravity,
+  imu_clock_stepped,
+  clock_offset,
+  lagging,
+  froze,
+  feet_not_still,
+  map_begun_anew,
+  state_thrown_away,
+  foreign_images,
+  camera_turned,
+};
+
+enum class Severity : std::uint8_t { notice, warning, error };
+
+/// `text`: "{}" is replaced by the value times `scale` with so many digits, "[]" by the detail.
+struct ReasonRow {
+  Reason reason;
+  Severity severity;
+  const char* name;
+  const char* text;
+  double scale = 1;
+  int digits = 0;
+};
+
+inline constexpr std::array reasons = {
+    ReasonRow{Reason::start, Severity::notice, "start", "start"},
+    ReasonRow{Reason::imu_lost, Severity::notice, "imu_lost", "imu lost"},
+    ReasonRow{Reason::imu_frozen, Severity::notice, "imu_frozen", "imu frozen"},
+    ReasonRow{Reason::imu_back, Severity::notice, "imu_back", "imu is back"},
+    ReasonRow{Reason::legs_lost, Severity::notice, "legs_lost", "legs lost"},
+    ReasonRow{Reason::legs_frozen, Severity::notice, "legs_frozen", "legs frozen"},
+    ReasonRow{Reason::legs_back, Severity::notice, "legs_back", "legs are back"},
+    ReasonRow{Reason::lidar_lost, Severity::notice, "lidar_lost", "lidar lost"},
+    ReasonRow{Reason::lidar_frozen, Severity::notice, "lidar_frozen", "lidar frozen"},
+    ReasonRow{Reason::lidar_back, Severity::notice, "lidar_back", "lidar is back"},
+    ReasonRow{Reason::camera_lost, Severity::notice, "camera_lost", "camera lost"},
+    ReasonRow{Reason::camera_frozen, Severity::notice, "camera_frozen", "camera frozen"},
+    ReasonRow{Reason::camera_used, Severity::notice, "camera_used", "images are used"},
+    ReasonRow{Reason::camera_useless, Severity::notice, "camera_useless", "images tell nothing"},
+    ReasonRow{Reason::not_used, Severity::notice, "not_used", "not used"},
+    ReasonRow{Reason::not_finite, Severity::warning, "not_finite", "not finite"},
+    ReasonRow{Reason::absurd_value, Severity::warning, "absurd_value", "absurd value"},
+    ReasonRow{Reason::absurd_stamp, Severity::warning, "absurd_stamp", "absurd stamp"},
+    ReasonRow{Reason::empty, Severity::warning, "empty", "empty"},
+    ReasonRow{Reason::duplicate, Severity::warning, "duplicate", "duplicate"},
+    ReasonRow{Reason::late, Severity::warning, "late", "late"},
+    ReasonRow{Reason::time_jump, Severity::warning, "time_jump", "time jump"},
+    ReasonRow{Reason::clock_back, Severity::warning, "clock_back", "its clock went back"},
+    ReasonRow{Reason::clock_forward, Severity::warning, "clock_forward", "its clock went ahead"},
+    ReasonRow{Reason::clock_ahead, Severity::warning, "clock_ahead", "its clock is ahead of the IMU's", 1e3, 0},
+    ReasonRow{Reason::repeated_values, Severity::warning, "repeated_values", "the same values again"},
+    ReasonRow{Reason::repeated_image, Severity::warning, "repeated_image", "the same picture again"},
+    ReasonRow{Reason::frozen, Severity::warning, "frozen", "frozen"},
+    ReasonRow{Reason::before_start, Severity::notice, "before_start", "before the start"},
+    ReasonRow{Reason::before_state, Severity::warning, "before_state", "before the state"},
+    ReasonRow{Reason::before_motion, Severity::warning, "before_motion", "before the motion is known"},
+    ReasonRow{Reason::before_sweep, Severity::warning, "before_sweep", "before the first sweep"},
+    ReasonRow{Reason::before_rejoined, Severity::warning, "before_rejoined", "before the map is joined again"},
+    ReasonRow{Reason::no_imu, Severity::warning, "no_imu", "no IMU"},
+    ReasonRow{Reason::no_lidar, Severity::warning, "no_lidar", "no LiDAR"},
+    ReasonRow{Reason::not_calm, Severity::warning, "not_calm", "not calm yet"},
+    ReasonRow{Reason::wrong_joints, Severity::warning, "wrong_joints", "joints that do not fit the robot"},
+    ReasonRow{Reason::no_usable_point, Severity::warning, "no_usable_point", "no usable point"},
+    ReasonRow{Reason::fits_nowhere, Severity::warning, "fits_nowhere", "fits nowhere in the map"},
+    ReasonRow{Reason::image_size, Severity::warning, "image_size", "another size than configured"},
+    ReasonRow{Reason::image_channels, Severity::warning, "image_channels", "neither grey nor colour"},
+    ReasonRow{Reason::image_cut, Severity::warning, "image_cut", "cut short"},
+    ReasonRow{Reason::mount_doubted, Severity::warning, "mount_doubted", "not mounted as configured"},
+    ReasonRow{Reason::pose_uncertain, Severity::warning, "pose_uncertain", "the pose is too uncertain"},
+    ReasonRow{Reason::agrees_with_nothing, Severity::warning, "agrees_with_nothing", "agrees with nothing"},
+    ReasonRow{Reason::moving_start, Severity::warning, "moving_start",
+              "the robot did not stand still: started on the move, with wide uncertainties"},
+    ReasonRow{Reason::strange_gravity, Severity::warning, "strange_gravity",
+              "the accelerometer measured {} at the start: neither 9.8 m/s^2 nor 1 g", 1, 6},
+    ReasonRow{Reason::imu_clock_stepped, Severity::warning, "imu_clock_stepped",
+              "the IMU's clock went [] by {} ms: the outputs' stamps go on as if it had not", 1e3, 0},
+    ReasonRow{Reason::clock_offset, Severity::warning, "clock_offset",
+              "its clock is {} ms behind the IMU's (negative: ahead), and is corrected from when that was seen: set []", 1e3, 1},
+    ReasonRow{Reason::lagging, Severity::warning, "lagging", "its messages come {} ms after the IMU's of the same time", 1e3, 0},
+    ReasonRow{Reason::froze, Severity::warning, "froze", "frozen: it kept saying the same"},
+    ReasonRow{Reason::feet_not_still, Severity::warning, "feet_not_still",
+              "no foot seemed to stand still in {} % of the messages: is the mount of the IMU right, and the URDF this robot's?", 100, 0},
+    ReasonRow{Reason::map_begun_anew, Severity::error, "map_begun_anew",
+              "the map was begun anew, because sweeps had fitted nowhere: poses before and after do not belong together"},
+    ReasonRow{Reason::state_thrown_away, Severity::warning, "state_thrown_away",
+              "a state that made no sense was thrown away: back to that of {} s before", 1, 3},
+    ReasonRow{Reason::foreign_images, Severity::warning, "foreign_images", "images of []"},
+    ReasonRow{
+        Reason::camera_turned, Severity::warning, "camera_turned",
+        "the images fit a camera that is turned by {} degrees or more ([] about the axes of the IMU) against camera.T_imu_camera.R: is "
+        "the calibration that of this robot, and camera.time_offset right? Images are not used any more",
+        1, 1},
+};
+inline constexpr std::size_t reason_count = reasons.size();
+
+static_assert([] {
+  for (std::size_t i = 0; i < reason_count; ++i) {
+    if (reasons[i].reason != static_cast<Reason>(i)) return false;
+  }
+  return true;
+}());
+
+constexpr const ReasonRow& row_of(Reason r) { return reasons[static_cast<std::size_t>(r)]; }
+constexpr const char* name_of(Reason r) { return row_of(r).name; }
+constexpr const char* text_of(Reason r) { return row_of(r).text; }
+/// Reasons for which a message was not used.
+constexpr bool is_of_message(Reason r) { return r >= Reason::not_used && r <= Reason::agrees_with_nothing; }
+/// Reasons of a change of modality.
+constexpr bool is_of_modality(Reason r) { return r < Reason::not_used; }
+
+}  // namespace kilvo
