@@ -77,7 +77,7 @@ void SensorInputs::receive(Sensor sensor, bool is_compressed, const Event& event
     ++input.messages;
     input.last = now;
   }
-  if (lab::sensor_of_type(type) != sensor) {
+  if (!lab::is_type_of(sensor, type)) {
     complain(input, fmt::format("its type is {}, but the sensor {} needs {}", type, name_of(sensor), accepted_text(sensor)));
     return;
   }
@@ -98,7 +98,7 @@ void SensorInputs::take(Sensor sensor, const std::string& type, lab::Bytes bytes
   std::optional<Measurement> measurement;
   {
     const std::lock_guard lock(input.mutex);
-    measurement = input.intake.take(type, bytes, arrived, point_time);
+    measurement = input.intake.take(sensor, type, bytes, arrived, point_time);
     if (measurement) input.fault.clear();
   }
   if (measurement) {

@@ -4,7 +4,8 @@
 #include <optional>
 
 #include "lab/messages/point_cloud2.hpp"
-#include "lab/messages/ros_header.hpp"
+#include "lab/messages/ros_types.hpp"
+#include "lab/messages/wire_reader.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -47,30 +48,21 @@ const CloudField* CloudLayout::find(std::string_view name) const {
   return it == fields.end() ? nullptr : &*it;
 }
 
-Decoded<CloudLayout> read_cloud_layout(Bytes message) {
-  ByteReader reader(message);
+Decoded<CloudLayout> read_cloud_layout(const WireMessage& message) {
+  const auto m = read_message<PointCloud2Message>(message);
+  if (!m) return DecodeError{m.reason()};
+  if (m->point_fields.size() > most_fields) return bad("claims " + std::to_string(m->point_fields.size()) + " fields");
   CloudLayout cloud;
-  cloud.stamp = read_ros_header(reader).stamp;
-  cloud.height = reader.read<std::uint32_t>();
-  cloud.width = reader.read<std::uint32_t>();
-  const std::size_t field_count = reader.read<std::uint32_t>();
-  if (field_count > most_fields) return bad("claims " + std::to_string(field_count) + " fields");
-  for (std::size_t i = 0; i < field_count && reader.ok(); ++i) {
-    CloudField field;
-    field.name = reader.string();
-    field.offset = reader.read<std::uint32_t>();
-    const auto code = reader.read<std::uint8_t>();
-    const auto type = scalar_type(code, reader.read<std::uint32_t>());
-    if (type) field.type = *type;
-    if (type && reader.ok()) cloud.fields.push_back(field);
+  cloud.stamp = m->header.stamp;
+  cloud.height = m->height;
+  cloud.width = m->width;
+  for (const PointFieldMessage& field : m->point_fields) {
+    if (const auto type = scalar_type(field.datatype, field.count)) cloud.fields.push_back({field.name, field.offset, *type});
   }
-  cloud.big_endian = reader.read<std::uint8_t>() != 0;
-  cloud.point_step = reader.read<std::uint32_t>();
-  cloud.row_step = reader.read<std::uint32_t>();
-  cloud.data = reader.array();
-  reader.skip(1);  // is_dense: said, but not to be relied upon
-  if (!reader.ok()) return bad("the message ends before its data does");
-  if (reader.remaining() != 0) return bad(std::to_string(reader.remaining()) + " bytes left over at the end");
+  cloud.big_endian = m->is_bigendian != 0;
+  cloud.point_step = m->point_step;
+  cloud.row_step = m->row_step;
+  cloud.data = m->data.raw;  // is_dense is not to be relied upon
 
   if (cloud.width == 0 || cloud.height == 0) cloud.width = cloud.height = 0;
   if (cloud.width != 0 && cloud.point_step == 0) return bad("point_step is 0");

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "kilvo/sensors/time.hpp"
-#include "lab/messages/bytes.hpp"
 #include "lab/messages/decoded.hpp"
+#include "lab/messages/encoding.hpp"
 
 namespace kilvo::lab {
 
@@ -36,7 +36,7 @@ struct CloudLayout {
 };
 
 /// Fails unless all the points that the message claims are really in it.
-Decoded<CloudLayout> read_cloud_layout(Bytes message);
+Decoded<CloudLayout> read_cloud_layout(const WireMessage& message);
 
 /// Calls store(i, value) for each point i with the value of one column, as its own type.
 template <class T, class Store>

@@ -8,7 +8,8 @@
 #include <type_traits>
 
 #include "lab/messages/raw_image.hpp"
-#include "lab/messages/ros_header.hpp"
+#include "lab/messages/ros_types.hpp"
+#include "lab/messages/wire_reader.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -86,22 +87,20 @@ Decoded<Image> decode_png(Bytes file) {
   return image;
 }
 
-Decoded<CameraImage> decode_compressed_image(Bytes message) {
+Decoded<CameraImage> decode_compressed_image(const WireMessage& message) {
   constexpr std::array<std::uint8_t, 3> jpeg_magic{0xFF, 0xD8, 0xFF};
   constexpr std::array<std::uint8_t, 8> png_magic{0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
-  ByteReader reader(message);
-  CameraImage decoded;
-  decoded.t = read_ros_header(reader).stamp;
-  const std::string_view format = reader.string();
-  const Bytes file = reader.array();
-  if (!reader.ok() || reader.remaining() != 0) return DecodeError{"sensor_msgs/CompressedImage: the lengths do not fit the message"};
-
+  const auto m = read_message<CompressedImageMessage>(message);
+  if (!m) return DecodeError{m.reason()};
+  const Bytes file = m->data.raw;
   const bool jpeg = begins_with(file, jpeg_magic);
   if (!jpeg && !begins_with(file, png_magic)) {
-    return DecodeError{"sensor_msgs/CompressedImage: neither JPEG nor PNG (format " + std::string(format.substr(0, 40)) + ")"};
+    return DecodeError{"sensor_msgs/CompressedImage: neither JPEG nor PNG (format " + std::string(m->format.substr(0, 40)) + ")"};
   }
   auto image = jpeg ? decode_jpeg(file) : decode_png(file);
   if (!image) return DecodeError{image.reason()};
+  CameraImage decoded;
+  decoded.t = m->header.stamp;
   decoded.image = *std::move(image);
   return decoded;
 }

@@ -2,14 +2,14 @@
 #pragma once
 
 #include "kilvo/sensors/measurement.hpp"
-#include "lab/messages/bytes.hpp"
 #include "lab/messages/decoded.hpp"
+#include "lab/messages/encoding.hpp"
 
 namespace kilvo::lab {
 
 /// JPEG and PNG are told apart by their first bytes, not by the format text, which drivers fill as they please. A picture that is cut
 /// short or damaged is an error, even if half of it could be shown. At most `most_pixels` (raw_image.hpp) are ever allocated.
-Decoded<CameraImage> decode_compressed_image(Bytes message);
+Decoded<CameraImage> decode_compressed_image(const WireMessage& message);
 
 /// The picture alone.
 Decoded<Image> decode_jpeg(Bytes file);

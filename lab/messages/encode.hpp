@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kilvo/sensors/measurement.hpp"
+#include "lab/messages/encoding.hpp"
 
 namespace kilvo::lab {
 
@@ -20,17 +21,17 @@ struct MessageType {
 const MessageType& written_type(Sensor sensor);
 
 /// Unit quaternion of no meaning and covariances of zero; orientation_covariance[0] = -1 says "no orientation".
-std::vector<std::uint8_t> encode(const ImuSample& sample, const std::string& frame_id);
+std::vector<std::uint8_t> encode(const ImuSample& sample, const std::string& frame_id, Encoding encoding = Encoding::ros1);
 
-std::vector<std::uint8_t> encode(const JointSample& sample, const std::string& frame_id);
+std::vector<std::uint8_t> encode(const JointSample& sample, const std::string& frame_id, Encoding encoding = Encoding::ros1);
 
 /// Fields x y z intensity (float32) and timestamp (float64, absolute nanoseconds, as livox_ros_driver2; a double holds such a time to
 /// 256 ns). Height 1, no padding.
-std::vector<std::uint8_t> encode(const LidarScan& scan, const std::string& frame_id);
+std::vector<std::uint8_t> encode(const LidarScan& scan, const std::string& frame_id, Encoding encoding = Encoding::ros1);
 
 /// mono8 or rgb8.
-std::vector<std::uint8_t> encode(const CameraImage& image, const std::string& frame_id);
+std::vector<std::uint8_t> encode(const CameraImage& image, const std::string& frame_id, Encoding encoding = Encoding::ros1);
 
-std::vector<std::uint8_t> encode(const Measurement& measurement, const std::string& frame_id);
+std::vector<std::uint8_t> encode(const Measurement& measurement, const std::string& frame_id, Encoding encoding = Encoding::ros1);
 
 }  // namespace kilvo::lab

@@ -16,8 +16,8 @@ TEST(Encode, EveryMeasurementComesBackFromTheTypeItIsWrittenAs) {
   for (const auto& measurement : measurements) {
     const Sensor sensor = sensor_of(measurement);
     const auto& type = written_type(sensor);
-    EXPECT_EQ(sensor_of_type(type.name), sensor);
-    const auto decoded = decode_measurement(type.name, encode(measurement, "frame"), absolute_ns);
+    EXPECT_TRUE(is_type_of(sensor, type.name));
+    const auto decoded = decode_measurement(sensor, type.name, encode(measurement, "frame"), absolute_ns);
     ASSERT_TRUE(decoded) << decoded.reason();
     EXPECT_EQ(sensor_of(decoded->measurement), sensor);
     EXPECT_EQ(encode(decoded->measurement, "frame"), encode(measurement, "frame"));
@@ -25,14 +25,16 @@ TEST(Encode, EveryMeasurementComesBackFromTheTypeItIsWrittenAs) {
 }
 
 TEST(DecodeMeasurement, RefusesATypeItDoesNotKnow) {
-  EXPECT_EQ(decode_measurement("nav_msgs/Odometry", {}, {}).reason(), "nav_msgs/Odometry is not read");
+  const auto decoded = decode_measurement(Sensor::imu, "nav_msgs/Odometry", Bytes{}, {});
+  EXPECT_EQ(decoded.reason(), "nav_msgs/Odometry is not read for the sensor imu");
 }
 
 TEST(AcceptedTypes, BothLivoxDriversAreLidars) {
-  EXPECT_EQ(sensor_of_type("livox_ros_driver/CustomMsg"), Sensor::lidar);
-  EXPECT_EQ(sensor_of_type("livox_ros_driver2/CustomMsg"), Sensor::lidar);
-  EXPECT_EQ(sensor_of_type("sensor_msgs/CompressedImage"), Sensor::camera);
-  EXPECT_EQ(sensor_of_type("sensor_msgs/CameraInfo"), std::nullopt);
+  EXPECT_EQ(sensors_of_type("livox_ros_driver/CustomMsg"), std::vector{Sensor::lidar});
+  EXPECT_EQ(sensors_of_type("livox_ros_driver2/CustomMsg"), std::vector{Sensor::lidar});
+  EXPECT_EQ(sensors_of_type("sensor_msgs/CompressedImage"), std::vector{Sensor::camera});
+  EXPECT_EQ(sensors_of_type("unitree_hg/LowState"), (std::vector{Sensor::imu, Sensor::legs}));
+  EXPECT_TRUE(sensors_of_type("sensor_msgs/CameraInfo").empty());
 }
 
 }  // namespace

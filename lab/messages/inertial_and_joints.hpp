@@ -2,15 +2,15 @@
 #pragma once
 
 #include "kilvo/sensors/measurement.hpp"
-#include "lab/messages/bytes.hpp"
 #include "lab/messages/decoded.hpp"
+#include "lab/messages/encoding.hpp"
 
 namespace kilvo::lab {
 
 /// sensor_msgs/Imu. Orientation and covariances are not used. Values are passed on as they are, finite or not.
-Decoded<ImuSample> decode_imu(Bytes message);
+Decoded<ImuSample> decode_imu(const WireMessage& message);
 
 /// sensor_msgs/JointState. The four arrays may have any lengths; whether they agree is for the estimator to judge.
-Decoded<JointSample> decode_joint_state(Bytes message);
+Decoded<JointSample> decode_joint_state(const WireMessage& message);
 
 }  // namespace kilvo::lab

@@ -2,13 +2,11 @@
 
 #include <cstdlib>
 
-#include "lab/messages/ros_header.hpp"
+#include "lab/messages/ros_types.hpp"
+#include "lab/messages/wire_reader.hpp"
 
 namespace kilvo::lab {
 namespace {
-
-// CustomPoint: uint32 offset_time, float32 x y z, uint8 reflectivity, tag, line.
-constexpr std::size_t point_bytes = 19;
 
 // Clocks that are one clock do not differ by more: the driver sets stamp and timebase from the same packet.
 constexpr std::int64_t same_clock_ns = 1'000'000'000;
@@ -19,20 +17,15 @@ constexpr std::uint64_t latest_timebase = std::uint64_t{1} << 62;
 struct Cloud {
   Time t{};
   std::int64_t first_offset_ns = 0;  // timebase minus t
-  Bytes points;
+  Structs<LivoxPoint> points;
 };
 
-Decoded<Cloud> read_cloud(Bytes message) {
-  ByteReader reader(message);
-  Cloud cloud;
-  cloud.t = read_ros_header(reader).stamp;
-  const auto raw_timebase = reader.read<std::uint64_t>();
-  const std::int64_t timebase = raw_timebase < latest_timebase ? static_cast<std::int64_t>(raw_timebase) : 0;
-  reader.skip(8);  // point_num, which the array says again; lidar_id, rsvd
-  cloud.points = reader.array(point_bytes);
-  const std::size_t count = cloud.points.size() / point_bytes;
-  if (!reader.ok()) return DecodeError{"livox CustomMsg: the message ends before its points do"};
-  if (reader.remaining() != 0) return DecodeError{"livox CustomMsg: " + std::to_string(reader.remaining()) + " bytes left over at the end"};
+Decoded<Cloud> read_cloud(const WireMessage& message) {
+  const auto m = read_message<LivoxMessage>(message);
+  if (!m) return DecodeError{m.reason()};
+  Cloud cloud{m->header.stamp, 0, m->points};
+  const std::int64_t timebase = m->timebase < latest_timebase ? static_cast<std::int64_t>(m->timebase) : 0;
+  const std::size_t count = cloud.points.size();
   if (count > most_points_in_a_cloud) return DecodeError{"livox CustomMsg: claims " + std::to_string(count) + " points"};
   if (to_ns(cloud.t) == 0) cloud.t = time_from_ns(timebase);
   const bool same_clock = timebase > to_ns(cloud.t) - same_clock_ns && timebase < to_ns(cloud.t) + same_clock_ns;
@@ -63,17 +56,17 @@ Decoded<PointTimeFormat> detect_livox_point_time(const std::vector<CloudTimes>& 
   return DecodeError{"the point times are all equal (field offset_time)"};
 }
 
-Decoded<DecodedScan> decode_livox(Bytes message, const PointTimeFormat& format) {
+Decoded<DecodedScan> decode_livox(const WireMessage& message, const PointTimeFormat& format) {
   const auto cloud = read_cloud(message);
   if (!cloud) return DecodeError{cloud.reason()};
   DecodedScan decoded;
   decoded.scan.t = cloud->t;
   auto& points = decoded.scan.points;
-  points.resize(cloud->points.size() / point_bytes);
+  points.resize(cloud->points.size());
   const bool timed = format.reference != TimeReference::none;
   std::size_t kept = 0;
-  for (std::size_t at = 0; at < cloud->points.size(); at += point_bytes) {
-    const std::uint8_t* bytes = cloud->points.data() + at;
+  for (std::size_t i = 0; i < cloud->points.size(); ++i) {
+    const std::uint8_t* bytes = cloud->points.at(i);
     const std::int64_t offset = timed ? cloud->first_offset_ns + offset_time(bytes) : 0;
     if (std::abs(offset) > farthest_point_time.count()) continue;
     points[kept] = read_point(bytes);
@@ -84,14 +77,14 @@ Decoded<DecodedScan> decode_livox(Bytes message, const PointTimeFormat& format) 
   return decoded;
 }
 
-Decoded<CloudTimes> observe_livox(Bytes message) {
+Decoded<CloudTimes> observe_livox(const WireMessage& message) {
   const auto cloud = read_cloud(message);
   if (!cloud) return DecodeError{cloud.reason()};
-  CloudTimes times{cloud->t, cloud->points.size() / point_bytes, {"offset_time", "x", "y", "z", "reflectivity", "tag", "line"}, {}};
+  CloudTimes times{cloud->t, cloud->points.size(), {"offset_time", "x", "y", "z", "reflectivity", "tag", "line"}, {}};
   if (times.points == 0) return times;
-  double low = offset_time(cloud->points.data()), high = low;
-  for (std::size_t at = 0; at < cloud->points.size(); at += point_bytes) {
-    const double offset = offset_time(cloud->points.data() + at);
+  double low = offset_time(cloud->points.at(0)), high = low;
+  for (std::size_t i = 0; i < cloud->points.size(); ++i) {
+    const double offset = offset_time(cloud->points.at(i));
     low = std::min(low, offset);
     high = std::max(high, offset);
   }

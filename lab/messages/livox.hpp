@@ -11,9 +11,9 @@ Decoded<PointTimeFormat> detect_livox_point_time(const std::vector<CloudTimes>& 
 /// The scan's time is the header's stamp, or timebase when the stamp is 0. The offsets count from that time: where timebase and stamp
 /// are on one clock their difference is added, where they are not, timebase is taken to be the stamp. Reflectivity becomes intensity.
 /// With TimeReference::none all offsets are 0.
-Decoded<DecodedScan> decode_livox(Bytes message, const PointTimeFormat& format);
+Decoded<DecodedScan> decode_livox(const WireMessage& message, const PointTimeFormat& format);
 
 /// What detect_point_time() needs from one message.
-Decoded<CloudTimes> observe_livox(Bytes message);
+Decoded<CloudTimes> observe_livox(const WireMessage& message);
 
 }  // namespace kilvo::lab

@@ -7,11 +7,14 @@
 #include "lab/messages/inertial_and_joints.hpp"
 #include "lab/messages/livox.hpp"
 #include "lab/messages/raw_image.hpp"
+#include "lab/messages/unitree.hpp"
 
 namespace kilvo::lab {
 namespace {
 
 constexpr std::string_view point_cloud2 = "sensor_msgs/PointCloud2";
+constexpr std::string_view hg_low_state = "unitree_hg/LowState", hg_imu_state = "unitree_hg/IMUState";
+constexpr std::string_view go_low_state = "unitree_go/LowState";
 
 template <class T>
 Decoded<DecodedMeasurement> plain(Decoded<T> decoded) {
@@ -24,48 +27,59 @@ Decoded<DecodedMeasurement> timed(Decoded<DecodedScan> decoded) {
   return DecodedMeasurement{std::move(decoded->scan), decoded->absurd_times};
 }
 
+Decoded<DecodedMeasurement> part(Sensor sensor, Decoded<UnitreeSample> decoded) {
+  if (!decoded) return DecodeError{decoded.reason()};
+  auto measurement = sensor == Sensor::imu ? plain<ImuSample>(decoded->imu) : plain(std::move(decoded->joints));
+  if (measurement) measurement->tick = decoded->tick;
+  return measurement;
+}
+
 }  // namespace
 
 const std::vector<std::string_view>& accepted_types(Sensor sensor) {
   static const std::array<std::vector<std::string_view>, sensor_count> types{{
-      {"sensor_msgs/Imu"},
-      {"sensor_msgs/JointState"},
+      {"sensor_msgs/Imu", hg_low_state, hg_imu_state, go_low_state},
+      {"sensor_msgs/JointState", hg_low_state, go_low_state},
       {point_cloud2, "livox_ros_driver/CustomMsg", "livox_ros_driver2/CustomMsg"},
       {"sensor_msgs/Image", "sensor_msgs/CompressedImage"},
   }};
   return types[static_cast<std::size_t>(sensor)];
 }
 
-std::optional<Sensor> sensor_of_type(std::string_view ros_type) {
+bool is_type_of(Sensor sensor, std::string_view type) { return std::ranges::count(accepted_types(sensor), type) != 0; }
+
+std::vector<Sensor> sensors_of_type(std::string_view type) {
+  std::vector<Sensor> sensors;
   for (int i = 0; i < sensor_count; ++i) {
-    const auto sensor = static_cast<Sensor>(i);
-    if (std::ranges::count(accepted_types(sensor), ros_type) != 0) return sensor;
+    if (is_type_of(static_cast<Sensor>(i), type)) sensors.push_back(static_cast<Sensor>(i));
   }
-  return std::nullopt;
+  return sensors;
 }
 
-Decoded<DecodedMeasurement> decode_measurement(std::string_view ros_type, Bytes message, const PointTimeFormat& point_time) {
-  const auto sensor = sensor_of_type(ros_type);
-  if (!sensor) return DecodeError{std::string(ros_type) + " is not read"};
-  switch (*sensor) {
+Decoded<DecodedMeasurement> decode_measurement(Sensor sensor, std::string_view type, const WireMessage& message,
+                                               const PointTimeFormat& point_time) {
+  if (!is_type_of(sensor, type)) return DecodeError{std::string(type) + " is not read for the sensor " + name_of(sensor)};
+  if (type == hg_low_state) return part(sensor, decode_hg_low_state(message));
+  if (type == go_low_state) return part(sensor, decode_go_low_state(message));
+  switch (sensor) {
     case Sensor::imu:
-      return plain(decode_imu(message));
+      return plain(type == hg_imu_state ? decode_hg_imu_state(message) : decode_imu(message));
     case Sensor::legs:
       return plain(decode_joint_state(message));
     case Sensor::lidar:
-      return timed(ros_type == point_cloud2 ? decode_point_cloud2(message, point_time) : decode_livox(message, point_time));
+      return timed(type == point_cloud2 ? decode_point_cloud2(message, point_time) : decode_livox(message, point_time));
     case Sensor::camera:
       break;
   }
-  return plain(ros_type == "sensor_msgs/Image" ? decode_image(message) : decode_compressed_image(message));
+  return plain(type == "sensor_msgs/Image" ? decode_image(message) : decode_compressed_image(message));
 }
 
-Decoded<CloudTimes> observe_cloud(std::string_view ros_type, Bytes message) {
-  return ros_type == point_cloud2 ? observe_point_cloud2(message) : observe_livox(message);
+Decoded<CloudTimes> observe_cloud(std::string_view type, const WireMessage& message) {
+  return type == point_cloud2 ? observe_point_cloud2(message) : observe_livox(message);
 }
 
-Decoded<PointTimeFormat> detect_point_time_of(std::string_view ros_type, const std::vector<CloudTimes>& clouds, Duration nominal_period) {
-  return ros_type == point_cloud2 ? detect_point_time(clouds, nominal_period) : detect_livox_point_time(clouds);
+Decoded<PointTimeFormat> detect_point_time_of(std::string_view type, const std::vector<CloudTimes>& clouds, Duration nominal_period) {
+  return type == point_cloud2 ? detect_point_time(clouds, nominal_period) : detect_livox_point_time(clouds);
 }
 
 }  // namespace kilvo::lab

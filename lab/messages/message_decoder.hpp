@@ -1,4 +1,4 @@
-// The one door from a message of any type that KILVO reads to a Measurement.
+// From a message of any type that KILVO reads, in either encoding, to measurements.
 #pragma once
 
 #include <optional>
@@ -9,22 +9,26 @@
 
 namespace kilvo::lab {
 
-/// The ROS message types that a sensor may come as; the usual one first.
+/// The message types that a sensor may come as, the usual one first. Types have their plain_type_name().
 const std::vector<std::string_view>& accepted_types(Sensor sensor);
 
-/// The sensor that a message type would be used for, if any.
-std::optional<Sensor> sensor_of_type(std::string_view ros_type);
+bool is_type_of(Sensor sensor, std::string_view type);
+
+/// Every sensor that a message of this type is one of: a LowState is of the IMU and of the legs.
+std::vector<Sensor> sensors_of_type(std::string_view type);
 
 struct DecodedMeasurement {
-  Measurement measurement;
-  std::size_t absurd_times = 0;  // LiDAR: points dropped because of their time
+  Measurement measurement;                 // time 0 where the message has no stamp; of joints in a LowState: its tick
+  std::size_t absurd_times = 0;            // LiDAR: points dropped because of their time
+  std::optional<std::uint32_t> tick = {};  // ms, wraps around: what a LowState has in place of a stamp
 };
 
-/// `ros_type` is one of accepted_types(); `point_time` matters for LiDAR types only.
-Decoded<DecodedMeasurement> decode_measurement(std::string_view ros_type, Bytes message, const PointTimeFormat& point_time);
+/// What a message says of one sensor; `point_time` matters for LiDAR types only. The error says why there is nothing.
+Decoded<DecodedMeasurement> decode_measurement(Sensor sensor, std::string_view type, const WireMessage& message,
+                                               const PointTimeFormat& point_time);
 
-/// For both LiDAR message types.
-Decoded<CloudTimes> observe_cloud(std::string_view ros_type, Bytes message);
-Decoded<PointTimeFormat> detect_point_time_of(std::string_view ros_type, const std::vector<CloudTimes>& clouds, Duration nominal_period);
+/// For all LiDAR message types.
+Decoded<CloudTimes> observe_cloud(std::string_view type, const WireMessage& message);
+Decoded<PointTimeFormat> detect_point_time_of(std::string_view type, const std::vector<CloudTimes>& clouds, Duration nominal_period);
 
 }  // namespace kilvo::lab

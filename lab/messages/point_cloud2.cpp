@@ -99,7 +99,7 @@ void read_offsets(const CloudLayout& cloud, const CloudField& field, const Point
 
 }  // namespace
 
-Decoded<DecodedScan> decode_point_cloud2(Bytes message, const PointTimeFormat& format) {
+Decoded<DecodedScan> decode_point_cloud2(const WireMessage& message, const PointTimeFormat& format) {
   const auto cloud = read_cloud_layout(message);
   if (!cloud) return DecodeError{cloud.reason()};
   DecodedScan decoded;
@@ -115,7 +115,7 @@ Decoded<DecodedScan> decode_point_cloud2(Bytes message, const PointTimeFormat& f
   return decoded;
 }
 
-Decoded<CloudTimes> observe_point_cloud2(Bytes message) {
+Decoded<CloudTimes> observe_point_cloud2(const WireMessage& message) {
   const auto cloud = read_cloud_layout(message);
   if (!cloud) return DecodeError{cloud.reason()};
   CloudTimes times{cloud->stamp, cloud->size(), {}, {}};

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "kilvo/sensors/measurement.hpp"
-#include "lab/messages/bytes.hpp"
 #include "lab/messages/decoded.hpp"
+#include "lab/messages/encoding.hpp"
 #include "lab/messages/point_time.hpp"
 
 namespace kilvo::lab {
@@ -18,9 +18,9 @@ inline constexpr std::size_t most_points_in_a_cloud = 2'000'000;
 
 /// Points in the order of the message; the scan's time is the header's stamp. Non-finite coordinates are passed on. Coordinates x y z
 /// may be any number type; intensity (or reflectivity) is 0 when absent. The field of `format` must be there unless its reference is none.
-Decoded<DecodedScan> decode_point_cloud2(Bytes message, const PointTimeFormat& format);
+Decoded<DecodedScan> decode_point_cloud2(const WireMessage& message, const PointTimeFormat& format);
 
 /// What detect_point_time() needs from one message.
-Decoded<CloudTimes> observe_point_cloud2(Bytes message);
+Decoded<CloudTimes> observe_point_cloud2(const WireMessage& message);
 
 }  // namespace kilvo::lab

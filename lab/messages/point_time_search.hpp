@@ -4,18 +4,18 @@
 #include <string>
 #include <vector>
 
-#include "lab/messages/bytes.hpp"
+#include "lab/messages/encoding.hpp"
 #include "lab/messages/point_time.hpp"
 
 namespace kilvo::lab {
 
 class PointTimeSearch {
  public:
-  /// `ros_type`: one of those of the LiDAR. `nominal_rate`: Hz, 0 when unknown.
-  PointTimeSearch(std::string ros_type, double nominal_rate) : ros_type_(std::move(ros_type)), nominal_rate_(nominal_rate) {}
+  /// `type`: one of those of the LiDAR. `nominal_rate`: Hz, 0 when unknown.
+  PointTimeSearch(std::string type, double nominal_rate) : type_(std::move(type)), nominal_rate_(nominal_rate) {}
 
   /// A message that cannot be decoded is passed over.
-  void look_at(Bytes message);
+  void look_at(const WireMessage& message);
 
   /// Enough full clouds have been seen.
   bool has_enough() const { return full_.size() >= clouds_to_look_at; }
@@ -27,7 +27,7 @@ class PointTimeSearch {
   Decoded<PointTimeFormat> decide() const;
 
  private:
-  std::string ros_type_;
+  std::string type_;
   double nominal_rate_;
   std::vector<CloudTimes> full_, small_;
 };

@@ -4,7 +4,8 @@
 #include <string>
 
 #include "lab/messages/pixel_formats.hpp"
-#include "lab/messages/ros_header.hpp"
+#include "lab/messages/ros_types.hpp"
+#include "lab/messages/wire_reader.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -13,19 +14,13 @@ DecodeError bad(const std::string& what) { return {"sensor_msgs/Image: " + what}
 
 }  // namespace
 
-Decoded<CameraImage> decode_image(Bytes message) {
-  ByteReader reader(message);
+Decoded<CameraImage> decode_image(const WireMessage& message) {
+  const auto m = read_message<ImageMessage>(message);
+  if (!m) return DecodeError{m.reason()};
+  const RawPixels raw{m->width, m->height, m->step, m->is_bigendian != 0, m->data.raw};
+  const std::string_view encoding = m->encoding;
   CameraImage decoded;
-  decoded.t = read_ros_header(reader).stamp;
-  RawPixels raw;
-  raw.height = reader.read<std::uint32_t>();
-  raw.width = reader.read<std::uint32_t>();
-  const std::string_view encoding = reader.string();
-  raw.big_endian = reader.read<std::uint8_t>() != 0;
-  raw.step = reader.read<std::uint32_t>();
-  raw.data = reader.array();
-  if (!reader.ok()) return bad("the message ends before its data does");
-  if (reader.remaining() != 0) return bad(std::to_string(reader.remaining()) + " bytes left over at the end");
+  decoded.t = m->header.stamp;
   if (raw.width == 0 || raw.height == 0) return bad("the image is empty");
   if (raw.width > most_pixels / raw.height) return bad(std::to_string(raw.width) + "x" + std::to_string(raw.height) + " is too large");
 

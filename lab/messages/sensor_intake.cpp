@@ -11,14 +11,16 @@ Time& stamp_in(Measurement& measurement) {
 
 }  // namespace
 
-std::optional<Measurement> SensorIntake::take(std::string_view ros_type, Bytes message, Time arrived, const PointTimeFormat& point_time) {
-  auto decoded = decode_measurement(ros_type, message, point_time);
+std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view type, const WireMessage& message, Time arrived,
+                                              const PointTimeFormat& point_time) {
+  auto decoded = decode_measurement(sensor, type, message, point_time);
   if (!decoded) {
     if (first_fault_.empty()) first_fault_ = decoded.reason();
     ++counts_.dropped["undecodable"];
     return std::nullopt;
   }
   ++counts_.used;
+  tick_ = decoded->tick;
   counts_.absurd_point_times += decoded->absurd_times;
   Time& stamp = stamp_in(decoded->measurement);
   if (stamp == Time{}) {

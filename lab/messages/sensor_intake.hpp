@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "kilvo/sensors/measurement.hpp"
-#include "lab/messages/bytes.hpp"
+#include "lab/messages/encoding.hpp"
 #include "lab/messages/point_time.hpp"
 
 namespace kilvo::lab {
@@ -27,9 +27,14 @@ class SensorIntake {
   explicit SensorIntake(double time_offset = 0) : time_offset_(time_offset) {}
 
   /// `arrived`: when the message was recorded, or received. `point_time` matters for LiDAR types only.
-  std::optional<Measurement> take(std::string_view ros_type, Bytes message, Time arrived, const PointTimeFormat& point_time);
+  /// `type` is a plain_type_name() that is_type_of() the sensor.
+  std::optional<Measurement> take(Sensor sensor, std::string_view type, const WireMessage& message, Time arrived,
+                                  const PointTimeFormat& point_time);
   /// A message was too large to be looked at.
   void refuse_too_large() { ++counts_.dropped["too_large"]; }
+
+  /// The counter that the last message that was taken has in place of a stamp (ms, wraps around); nothing when it has none.
+  const std::optional<std::uint32_t>& tick() const { return tick_; }
 
   const SensorCounts& counts() const { return counts_; }
   /// Why the first undecodable message was; empty without one.
@@ -39,6 +44,7 @@ class SensorIntake {
   double time_offset_;
   SensorCounts counts_;
   std::string first_fault_;
+  std::optional<std::uint32_t> tick_;
 };
 
 }  // namespace kilvo::lab

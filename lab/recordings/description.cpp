@@ -48,9 +48,13 @@ std::string first_of(Rosbag1Reader& reader, const TopicDescription& topic) {
   reader.select([&](const BagConnection& c) { return c.topic == topic.topic && c.type == topic.type; }, topic.first);
   const auto message = reader.next();
   if (!message) return "not readable";
-  const auto decoded = decode_measurement(topic.type, message->bytes, {});
-  if (!decoded) return decoded.reason();
-  return std::visit([](const auto& m) { return detail_of(m); }, decoded->measurement);
+  std::string details;
+  for (const Sensor sensor : topic.fits) {
+    const auto decoded = decode_measurement(sensor, topic.type, message->bytes, {});
+    const auto detail = decoded ? std::visit([](const auto& m) { return detail_of(m); }, decoded->measurement) : decoded.reason();
+    details += (details.empty() ? "" : "; ") + detail;
+  }
+  return details;
 }
 
 void add(TopicDescription& topic, const TimesSummary& times) {
@@ -70,7 +74,7 @@ std::vector<TopicDescription> list_topics(const Rosbag1Reader& reader) {
     auto& topic = topics[{connection.topic, connection.type}];
     topic.topic = connection.topic;
     topic.type = connection.type;
-    topic.fits = sensor_of_type(connection.type);
+    topic.fits = sensors_of_type(connection.type);
     const auto times = reader.times().find(id);
     if (times != reader.times().end()) add(topic, times->second);
   }
@@ -87,7 +91,7 @@ void mark_used(RecordingDescription& description, const Rosbag1Reader& reader, c
     try {
       const auto chosen = choose_topic(reader.connections(), sensor, options[sensor].topic);
       for (auto& topic : description.topics) {
-        if (topic.topic == chosen.topic && topic.type == chosen.type) topic.used_for = sensor;
+        if (topic.topic == chosen.topic && topic.type == chosen.type) topic.used_for.push_back(sensor);
       }
     } catch (const InputError&) {
       // Nothing would be used for this sensor, and the list says so.
@@ -111,8 +115,8 @@ RecordingDescription describe_recording(const std::filesystem::path& input, cons
   for (const auto& [id, times] : reader.times()) description.messages += times.count;
   description.topics = list_topics(reader);
   for (auto& topic : description.topics) {
-    if (!topic.fits || topic.count == 0) continue;
-    topic.detail = *topic.fits == Sensor::lidar ? point_time_of(reader, topic) : first_of(reader, topic);
+    if (topic.fits.empty() || topic.count == 0) continue;
+    topic.detail = topic.fits.front() == Sensor::lidar ? point_time_of(reader, topic) : first_of(reader, topic);
   }
   mark_used(description, reader, options);
   description.damages = reader.damages();

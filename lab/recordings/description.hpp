@@ -9,12 +9,12 @@ struct TopicDescription {
   std::string topic;
   std::string type;
   std::uint64_t count = 0;
-  Time first{}, last{};            // recorded; both 0 when there are no messages
-  double rate = 0;                 // Hz over that time; 0 below two messages
-  double largest_gap = 0;          // s between two messages of one publisher
-  std::optional<Sensor> fits;      // what a topic of this type could be used for
-  std::optional<Sensor> used_for;  // what it would be used for with the options given
-  std::string detail;              // by the first messages: point times found, joints, image size, or why they cannot be read
+  Time first{}, last{};          // recorded; both 0 when there are no messages
+  double rate = 0;               // Hz over that time; 0 below two messages
+  double largest_gap = 0;        // s between two messages of one publisher
+  std::vector<Sensor> fits;      // what a topic of this type could be used for
+  std::vector<Sensor> used_for;  // what it would be used for with the options given
+  std::string detail;            // by the first messages: point times found, joints, image size, or why they cannot be read
 };
 
 struct RecordingDescription {

@@ -37,13 +37,13 @@ TEST(DescribeRecording, ListsTopicsWithRatesAndUses) {
   EXPECT_EQ(imu.count, 50U);
   EXPECT_NEAR(imu.rate, 100, 1e-9);
   EXPECT_NEAR(imu.largest_gap, 0.01, 1e-12);
-  EXPECT_EQ(imu.fits, Sensor::imu);
-  EXPECT_EQ(imu.used_for, Sensor::imu);
+  EXPECT_EQ(imu.fits, std::vector{Sensor::imu});
+  EXPECT_EQ(imu.used_for, std::vector{Sensor::imu});
   EXPECT_EQ(imu.detail, "first acceleration 9.81, so in m/s^2");
 
   const auto& lidar = topic_of(description, "/points");
-  EXPECT_EQ(lidar.fits, Sensor::lidar);
-  EXPECT_EQ(lidar.used_for, std::nullopt);
+  EXPECT_EQ(lidar.fits, std::vector{Sensor::lidar});
+  EXPECT_TRUE(lidar.used_for.empty());
   EXPECT_EQ(lidar.detail, "point time timestamp (float64): nanoseconds, absolute");
   EXPECT_EQ(topic_of(description, "/joints").detail, "2 names: left_knee_joint right_knee_joint");
   EXPECT_EQ(topic_of(description, "/camera/image_raw").detail, "16x8 grey");
@@ -64,7 +64,7 @@ TEST(DescribeRecording, TopicsThatCannotBeUsedAreNoError) {
   }
   const auto description = describe_recording(folder / "odd.bag");
   EXPECT_THAT(topic_of(description, "/points").detail, ::testing::HasSubstr("the clouds have no point times (fields: x y z intensity)"));
-  EXPECT_EQ(topic_of(description, "/odom").fits, std::nullopt);
+  EXPECT_TRUE(topic_of(description, "/odom").fits.empty());
   EXPECT_EQ(topic_of(description, "/odom").count, 1U);
   EXPECT_EQ(topic_of(description, "/feet").detail, "6 positions without names: the two-feet message");
   EXPECT_EQ(topic_of(description, "/silent").count, 0U);

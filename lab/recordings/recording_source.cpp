@@ -59,19 +59,27 @@ RecordingSource::RecordingSource(const std::filesystem::path& input, RecordingOp
 
 std::optional<Measurement> RecordingSource::decode(Sensor sensor, const RawMessage& message) {
   SensorIntake& intake = intakes_[static_cast<std::size_t>(sensor)];
-  if (message.size <= most_message_bytes) return intake.take(message.connection->type, message.bytes, message.time, point_time_);
+  if (message.size <= most_message_bytes) return intake.take(sensor, message.connection->type, message.bytes, message.time, point_time_);
   intake.refuse_too_large();
   return std::nullopt;
 }
 
+/// A message may be of several sensors: a LowState is of the IMU and of the legs.
 std::optional<Measurement> RecordingSource::next() {
-  while (const auto message = reader_.next()) {
-    const auto sensor = sensor_of_type(message->connection->type);
-    auto measurement = decode(sensor.value(), *message);
-    recorded_ = message->time;
-    if (measurement) return measurement;
+  while (true) {
+    for (; message_ && next_sensor_ < sensor_count; ++next_sensor_) {
+      const ChosenTopic& chosen = chosen_[static_cast<std::size_t>(next_sensor_)];
+      if (message_->connection->topic != chosen.topic || message_->connection->type != chosen.type) continue;
+      if (auto measurement = decode(static_cast<Sensor>(next_sensor_), *message_)) {
+        ++next_sensor_;
+        return measurement;
+      }
+    }
+    message_ = reader_.next();
+    if (!message_) return std::nullopt;
+    recorded_ = message_->time;
+    next_sensor_ = 0;
   }
-  return std::nullopt;
 }
 
 std::vector<std::string> RecordingSource::warnings() const {

@@ -70,6 +70,8 @@ class RecordingSource final : public MeasurementSource {
   std::array<ChosenTopic, sensor_count> chosen_;
   PointTimeFormat point_time_;
   std::array<SensorIntake, sensor_count> intakes_;
+  std::optional<RawMessage> message_;  // read last
+  int next_sensor_ = 0;                // that it has not been decoded for
   Time recorded_{};
 };
 

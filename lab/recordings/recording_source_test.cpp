@@ -113,7 +113,9 @@ TEST(RecordingSource, AWantedSensorWithoutATopicIsAnErrorThatNamesTheFileAndTheN
             (folder / "walk.bag").string() + ": no topic /imo for the sensor imu; the nearest is /imu (sensor_msgs/Imu)");
   options[Sensor::imu].topic = "/joints";
   EXPECT_EQ(error_of(folder / "walk.bag", options),
-            (folder / "walk.bag").string() + ": topic /joints is of type sensor_msgs/JointState, but the sensor imu needs sensor_msgs/Imu");
+            (folder / "walk.bag").string() +
+                ": topic /joints is of type sensor_msgs/JointState, but the sensor imu needs sensor_msgs/Imu or unitree_hg/LowState or "
+                "unitree_hg/IMUState or unitree_go/LowState");
 }
 
 TEST(RecordingSource, CloudsWithoutPointTimesAreAnErrorUnlessDeskewingIsOff) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "lab/messages/input_error.hpp"
-#include "lab/messages/ros_header.hpp"
+#include "lab/messages/ros_time.hpp"
 #include "lab/recordings/rosbag1_resync.hpp"
 
 namespace kilvo::lab {

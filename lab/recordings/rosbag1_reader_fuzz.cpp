@@ -8,7 +8,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     Rosbag1Reader reader(FileBytes(std::vector<std::uint8_t>(data, data + size)));
     const PointTimeFormat time{"timestamp", "float64", TimeUnit::nanoseconds, TimeReference::absolute, true};
-    while (const auto message = reader.next()) (void)decode_measurement(message->connection->type, message->bytes, time);
+    while (const auto message = reader.next()) {
+      const auto& type = message->connection->type;
+      for (const Sensor sensor : sensors_of_type(type)) (void)decode_measurement(sensor, type, message->bytes, time);
+    }
   } catch (const InputError&) {
     // Not a bag.
   }

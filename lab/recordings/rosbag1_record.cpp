@@ -1,6 +1,6 @@
 #include "lab/recordings/rosbag1_record.hpp"
 
-#include "lab/messages/ros_header.hpp"
+#include "lab/messages/ros_time.hpp"
 
 namespace kilvo::lab {
 namespace {

@@ -18,7 +18,7 @@ std::string accepted_text(Sensor sensor) {
   return text;
 }
 
-bool right_type(Sensor sensor, const BagConnection& connection) { return sensor_of_type(connection.type) == sensor; }
+bool right_type(Sensor sensor, const BagConnection& connection) { return is_type_of(sensor, connection.type); }
 
 /// Topics of the right type first, then by spelling.
 const BagConnection* nearest(const std::map<std::uint32_t, BagConnection>& connections, Sensor sensor, const std::string& pattern) {

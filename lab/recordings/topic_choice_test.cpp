@@ -55,7 +55,7 @@ TEST(ChooseTopic, AMissingTopicNamesTheNearestOfTheRightType) {
 TEST(ChooseTopic, WhenNoTopicIsOfTheRightTypeItSaysSo) {
   EXPECT_EQ(error_of(g1_topics(), Sensor::legs, "/joint_states"),
             "no topic /joint_states for the sensor legs; the nearest is /livox/imu (sensor_msgs/Imu), but none is of type "
-            "sensor_msgs/JointState");
+            "sensor_msgs/JointState or unitree_hg/LowState or unitree_go/LowState");
   EXPECT_EQ(error_of({}, Sensor::legs, "/joint_states"), "no topic /joint_states for the sensor legs: the recording has no topics");
 }
 
