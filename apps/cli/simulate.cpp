@@ -28,6 +28,7 @@ void add_simulate(CLI::App& program, Action& chosen) {
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{1'000'000'000}));
   verb->add_option("--duration", options->duration, "end after so many seconds; default: when the walk ends")->type_name("S");
   verb->add_option("--stride", options->stride, "every step so many times as long; default: 1")->type_name("X");
+  add_wear_options(*verb, options->wear);
   verb->add_flag("--quiet", options->quiet, "no progress, only errors");
   verb->footer(list_of_scenarios());
   verb->callback([out, options, &chosen] { chosen = [out, options] { return simulate(*out, *options); }; });

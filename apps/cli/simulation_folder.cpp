@@ -107,7 +107,8 @@ double simulate_into(const fs::path& folder, const SimulationOptions& options) {
     throw UsageError(fmt::format("--duration must be above 0 and at most {} seconds", longest));
   }
   if (options.seed < 0) throw UsageError("--seed must be 0 or more");
-  lab::SimulatorConfig config;
+  lab::SimulatorConfig config = lab::robot_of(scenario);
+  apply(options.wear, config);
   config.seed = static_cast<std::uint64_t>(options.seed);
   config.duration = options.duration.value_or(0);
   config.threads = 0;

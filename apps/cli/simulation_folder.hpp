@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "apps/cli/wear_options.hpp"
+
 namespace kilvo::cli {
 
 struct SimulationOptions {
@@ -14,6 +16,7 @@ struct SimulationOptions {
   std::optional<double> duration;  // s; until the walk ends by default
   bool quiet = false;              // no progress
   double stride = 1;               // every step so many times as long as in the scenario
+  WearOptions wear{};              // beside that of the scenario
 };
 
 /// Writes recording.bag, gt.tum, contacts.gt.csv, imu_truth.csv, exposure.csv, robot.urdf and config.yaml into `folder`. Returns the

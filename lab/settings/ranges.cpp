@@ -117,7 +117,7 @@ const std::vector<std::string>& choices_of(std::string_view key) {
   static const std::vector<std::string> none;
   static const std::map<std::string_view, std::vector<std::string>> table{
       {"legs.type", {"joints", "feet"}},
-      {"legs.contact", {"kilvo", "paper"}},
+      {"legs.contact", {"kilvo", "paper", "variance", "force"}},
       {"camera.model", {"pinhole_radtan", "equidistant"}},
   };
   const auto found = table.find(key);

@@ -72,6 +72,30 @@ Gait rolling() { return {.hip_height = 0.54, .heel_strike = 0.18, .toe_off = 0.3
 Gait slipping() { return {.slip = 0.03}; }
 Gait sinking() { return {.impact = 2, .sink = 0.012, .creep = 0.003}; }
 
+// As robots are after some time of use: leg lengths and zeros not as the URDF says, play and give, shocks, messages that get lost.
+WearModel well_used() {
+  constexpr double degree = std::numbers::pi / 180;
+  return {.sole_motion = 0.01,
+          .shock = 0.1,
+          .impact = 8,
+          .flex = 1.2 * degree,
+          .backlash = 0.15 * degree,
+          .zero_offset = 0.3 * degree,
+          .link_length = 0.005,
+          .velocity_lag = 0.003,
+          .stamp_jitter = 3e-4,
+          .lost = 0.005,
+          .repeated = 0.002,
+          .vibration = 1};
+}
+// The same at 50 Hz, from an IMU without a filter before it.
+WearModel well_used_and_slow() {
+  WearModel out = well_used();
+  out.vibration = 5;
+  out.stamp_jitter = 0.002;
+  return out;
+}
+
 // Steps and quarter turns about a rectangle.
 std::vector<Stage> square(int rounds, const Gait& gait, double length) {
   std::vector<Stage> out{stand(first_stand)};
@@ -105,6 +129,10 @@ std::vector<Scenario> of_the_room() {
       {"fast_walk", "long quick steps round a room", "room", room_corner, square(2, fast(), 0.32)},
       {"rolling", "soles that come down on the heel and leave over the toe", "room", room_corner, square(1, rolling(), 0.3)},
       {"slip", "the left foot slides 3 cm in every stance", "room", room_corner, square(1, slipping(), 0.24)},
+      {"worn", "round a room on legs that are not as the URDF says, on soles that give way", "room", room_corner, square(1, {}, 0.25), 0,
+       well_used(), 500},
+      {"worn_slow", "the same with joints and an unfiltered IMU at 50 Hz", "room", room_corner, square(1, {}, 0.25), 0,
+       well_used_and_slow(), 50, 50},
       {"soft", "a floor into which the feet sink and on which they creep", "room", room_corner, square(1, sinking(), 0.25)},
   };
 }
@@ -155,6 +183,14 @@ const std::vector<Scenario>& scenarios() {
     return out;
   }();
   return all;
+}
+
+SimulatorConfig robot_of(const Scenario& scenario) {
+  SimulatorConfig config;
+  config.wear = scenario.wear;
+  if (scenario.leg_rate > 0) config.joints.delivery.rate = scenario.leg_rate;
+  if (scenario.imu_rate > 0) config.imu.delivery.rate = scenario.imu_rate;
+  return config;
 }
 
 }  // namespace kilvo::lab

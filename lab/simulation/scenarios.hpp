@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "lab/simulation/footsteps.hpp"
+#include "lab/simulation/simulator_config.hpp"
 
 namespace kilvo::lab {
 
@@ -14,9 +15,14 @@ struct Scenario {
   std::string world;     // of make_scene()
   Place start;
   std::vector<Stage> stages;
-  double lidar_range = 0;  // m; 0: the sensor's own
+  double lidar_range = 0;             // m; 0: the sensor's own
+  WearModel wear{};                   // of its robot
+  double leg_rate = 0, imu_rate = 0;  // Hz; 0: the sensors' own
 };
 
 const std::vector<Scenario>& scenarios();
+
+/// The robot of a scenario: its wear and the rates of its sensors.
+SimulatorConfig robot_of(const Scenario& scenario);
 
 }  // namespace kilvo::lab

@@ -1,11 +1,19 @@
 #include "lab/simulation/simulator.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "lab/simulation/joint_effort.hpp"
 
 namespace kilvo::lab {
 namespace {
+
+// What the configuration leaves to the model of the wear.
+SimulatorConfig worn(SimulatorConfig config) {
+  config.shape = built(config.shape, config.wear, config.seed);
+  if (config.wear.zero_offset > 0) config.joints.offset_sigma = config.wear.zero_offset;
+  return config;
+}
 
 enum Stream : std::uint8_t { bias_stream = 1, offset_stream = 2, sensor_stream = 10 };
 
@@ -16,8 +24,9 @@ Ground ground_of(const Scenario& scenario, std::uint64_t seed) { return make_sce
 }  // namespace
 
 Simulator::Simulator(const Scenario& scenario, const SimulatorConfig& config)
-    : config_(config),
-      walk_(config_.shape, ground_of(scenario, config.seed), scenario.start, scenario.stages),
+    : config_(worn(config)),
+      walk_(config_.shape, ground_of(scenario, config.seed), scenario.start, on_soft_soles(scenario.stages, config.wear)),
+      wear_(config.wear, walk_, config.seed),
       world_(make_scene(scenario.world, config.seed), config.seed),
       lidar_(config_, world_, scenario.lidar_range),
       camera_(config_, world_),
@@ -28,7 +37,7 @@ Simulator::Simulator(const Scenario& scenario, const SimulatorConfig& config)
   gyro_bias_ = config.imu.gyro_bias_sigma * random.gaussian3();
   accel_bias_ = config.imu.accel_bias_sigma * random.gaussian3();
   Random offsets(config.seed, offset_stream);
-  for (double& offset : joint_offsets_) offset = config.joints.offset_sigma * offsets.gaussian();
+  for (double& offset : joint_offsets_) offset = config_.joints.offset_sigma * offsets.gaussian();
   for (std::size_t i = 0; i < sensor_count; ++i) {
     random_.emplace_back(config.seed, sensor_stream, i);
     if (config.use[i]) schedule(static_cast<Sensor>(i), 0);
@@ -63,12 +72,19 @@ Time Simulator::stamp(Sensor sensor, double t) {
 }
 
 std::optional<Measurement> Simulator::next() {
-  if (due_.empty()) return std::nullopt;
-  const Due due = due_.top();
-  due_.pop();
-  schedule(due.sensor, due.index + 1);
-  arrived_ = start_ + from_seconds(due.arrival);
-  return measure(due.sensor, due.index);
+  if (again_) return std::exchange(again_, std::nullopt);
+  while (!due_.empty()) {
+    const Due due = due_.top();
+    due_.pop();
+    schedule(due.sensor, due.index + 1);
+    arrived_ = start_ + from_seconds(due.arrival);
+    Measurement out = measure(due.sensor, due.index);
+    const Copies copies = wear_.copies(due.sensor);
+    if (copies == Copies::none) continue;
+    if (copies == Copies::two) again_ = out;
+    return out;
+  }
+  return std::nullopt;
 }
 
 Measurement Simulator::measure(Sensor sensor, std::int64_t index) {
@@ -96,7 +112,7 @@ ImuSample Simulator::imu_at(double t) {
   const SE3 T_WI = walk_.imu(t);
   imu_truth_ = {start_ + from_seconds(t),
                 walk_.angular_rate(t),
-                T_WI.R.inverse() * (walk_.acceleration(t) + Eigen::Vector3d(0, 0, gravity)),
+                T_WI.R.inverse() * (walk_.acceleration(t) + Eigen::Vector3d(0, 0, gravity)) + wear_.vibration(t),
                 gyro_bias_,
                 accel_bias_,
                 walk_.velocity(t)};
@@ -116,12 +132,13 @@ JointSample Simulator::joints_at(double t) {
   Random& random = random_[index_of(Sensor::legs)];
   const JointAngles angles = walk_.joints(t), rates = walk_.joint_velocities(t), efforts = joint_efforts(walk_, t, m.mass);
   JointSample out;
-  out.t = stamp(Sensor::legs, t);
+  const Wear::Encoders shown = wear_.encoders(t, rates, efforts);
+  out.t = wear_.joint_stamp(stamp(Sensor::legs, t));
   for (std::size_t i = 0; i < angles.size(); ++i) {
     out.names.push_back(joint_names()[i]);
-    const double noisy = angles[i] + joint_offsets_[i] + m.position_noise * random.gaussian();
+    const double noisy = angles[i] + shown.angle[i] + joint_offsets_[i] + m.position_noise * random.gaussian();
     out.position.push_back(m.resolution > 0 ? std::round(noisy / m.resolution) * m.resolution : noisy);
-    out.velocity.push_back(rates[i] + m.velocity_noise * random.gaussian());
+    out.velocity.push_back(rates[i] + shown.velocity[i] + m.velocity_noise * random.gaussian());
     out.effort.push_back(efforts[i] + m.effort_noise * random.gaussian());
   }
   return out;

@@ -10,6 +10,7 @@
 #include "lab/simulation/random.hpp"
 #include "lab/simulation/scenarios.hpp"
 #include "lab/simulation/walk.hpp"
+#include "lab/simulation/wear.hpp"
 
 namespace kilvo::lab {
 
@@ -66,6 +67,7 @@ class Simulator final : public MeasurementSource {
 
   SimulatorConfig config_;
   Walk walk_;
+  Wear wear_;
   World world_;
   LidarSensor lidar_;
   CameraSensor camera_;
@@ -77,6 +79,7 @@ class Simulator final : public MeasurementSource {
   Eigen::Vector3d gyro_bias_, accel_bias_;
   JointAngles joint_offsets_{};
   Time arrived_{}, measured_{};
+  std::optional<Measurement> again_;  // comes a second time
   ImuTruth imu_truth_{};
 };
 

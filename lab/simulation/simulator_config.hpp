@@ -6,6 +6,7 @@
 
 #include "kilvo/sensors/measurement.hpp"
 #include "lab/simulation/biped.hpp"
+#include "lab/simulation/wear_model.hpp"
 
 namespace kilvo::lab {
 
@@ -67,7 +68,8 @@ struct CameraModel {
 struct SimulatorConfig {
   std::uint64_t seed = 1;
   double duration = 0;  // s; 0: until the walk ends
-  BipedShape shape;
+  BipedShape shape;     // as the URDF has it
+  WearModel wear;
   ImuModel imu;
   JointModel joints;
   LidarModel lidar;

@@ -1,0 +1,62 @@
+#include "apps/cli/wear_options.hpp"
+
+#include <iterator>
+#include <numbers>
+
+namespace kilvo::cli {
+namespace {
+
+using lab::SimulatorConfig;
+
+constexpr double degree = std::numbers::pi / 180, milli = 1e-3, percent = 0.01;
+
+struct WearOption {
+  const char *name, *unit, *text;
+  double to_si, low, high;  // limits in the option's unit
+  double& (*value)(SimulatorConfig&);
+};
+
+constexpr WearOption table[] = {
+    {"--sole-motion", "MM", "loaded soles give way by so much", milli, 0, 50,
+     [](SimulatorConfig& c) -> double& { return c.wear.sole_motion; }},
+    {"--shock", "M/S", "what encoders show of a touchdown, at the foot", 1, 0, 10,
+     [](SimulatorConfig& c) -> double& { return c.wear.shock; }},
+    {"--impact", "M/S2", "how hard the torso rings at each touchdown", 1, 0, 200,
+     [](SimulatorConfig& c) -> double& { return c.wear.impact; }},
+    {"--joint-flex", "DEG", "joints give way by so much under 100 N m", degree, 0, 10,
+     [](SimulatorConfig& c) -> double& { return c.wear.flex; }},
+    {"--backlash", "DEG", "play of each joint", degree, 0, 5, [](SimulatorConfig& c) -> double& { return c.wear.backlash; }},
+    {"--zero-offset", "DEG", "sigma of the encoders' zeros", degree, 0, 10,
+     [](SimulatorConfig& c) -> double& { return c.wear.zero_offset; }},
+    {"--link-length", "PERCENT", "sigma of the true lengths of thighs and shins", percent, 0, 10,
+     [](SimulatorConfig& c) -> double& { return c.wear.link_length; }},
+    {"--velocity-lag", "MS", "low pass on the joint velocities", milli, 0, 100,
+     [](SimulatorConfig& c) -> double& { return c.wear.velocity_lag; }},
+    {"--stamp-jitter", "MS", "sigma of the joint stamps", milli, 0, 100, [](SimulatorConfig& c) -> double& { return c.wear.stamp_jitter; }},
+    {"--lost", "PERCENT", "of joint and IMU messages", percent, 0, 90, [](SimulatorConfig& c) -> double& { return c.wear.lost; }},
+    {"--repeated", "PERCENT", "of joint and IMU messages", percent, 0, 90, [](SimulatorConfig& c) -> double& { return c.wear.repeated; }},
+    {"--vibration", "M/S2", "rms of the torso while it walks, 45 to 90 Hz", 1, 0, 50,
+     [](SimulatorConfig& c) -> double& { return c.wear.vibration; }},
+    {"--leg-rate", "HZ", "of the joint messages", 1, 1, 4000, [](SimulatorConfig& c) -> double& { return c.joints.delivery.rate; }},
+    {"--imu-rate", "HZ", "of the IMU, without a filter before it", 1, 1, 4000,
+     [](SimulatorConfig& c) -> double& { return c.imu.delivery.rate; }},
+};
+
+static_assert(std::size(table) == std::tuple_size_v<decltype(WearOptions::given)>);
+
+}  // namespace
+
+void add_wear_options(CLI::App& verb, WearOptions& options) {
+  for (std::size_t i = 0; i < std::size(table); ++i) {
+    const WearOption& o = table[i];
+    verb.add_option(o.name, options.given[i], o.text)->type_name(o.unit)->check(CLI::Range(o.low, o.high))->group("Wear of the robot");
+  }
+}
+
+void apply(const WearOptions& options, SimulatorConfig& config) {
+  for (std::size_t i = 0; i < std::size(table); ++i) {
+    if (options.given[i]) table[i].value(config) = table[i].to_si * *options.given[i];
+  }
+}
+
+}  // namespace kilvo::cli
