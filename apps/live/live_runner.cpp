@@ -27,8 +27,9 @@ LiveRunner::LiveRunner(Estimator& estimator, const Robot& robot, const Estimator
       forks_({LivePropagator(robot, config), std::nullopt}),
       outputs_(most_outputs) {
   if (used_[static_cast<std::size_t>(Sensor::legs)]) {
-    fast_kinematics_.emplace(robot);
-    slow_kinematics_.emplace(robot);
+    const bool forces = config.legs.contact == "force";
+    fast_kinematics_.emplace(robot, forces);
+    slow_kinematics_.emplace(robot, forces);
   }
   waiting_for_ = estimator_.waiting_for();
   output_ = std::thread([this] { run_output(); });

@@ -49,7 +49,7 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
   if (!uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.leaf_size() * (1 + 1e-9))
     throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
-  if (uses(Sensor::legs)) kinematics_.emplace(robot);
+  if (uses(Sensor::legs)) kinematics_.emplace(robot, config.legs.contact == "force");
   if (uses(Sensor::camera)) camera_.emplace(robot.camera);
   T_CI_ = robot.camera.T_imu_camera.inverse();
 }

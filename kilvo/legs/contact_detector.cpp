@@ -9,10 +9,12 @@ namespace {
 // Of a patch that the robot's own contacts span: it ties steps to each other, it is no absolute height, m.
 constexpr double contact_patch_sigma = 0.01;
 
-std::variant<ContactEstimator, PaperContactEstimator> make(const LegConfig& config) {
+std::variant<ContactEstimator, PaperContactEstimator, VarianceContacts, ForceContacts> make(const LegConfig& config) {
   if (config.contact == "kilvo") return ContactEstimator(config);
   if (config.contact == "paper") return PaperContactEstimator();
-  throw std::invalid_argument("legs.contact: '" + config.contact + "' is neither 'kilvo' nor 'paper'");
+  if (config.contact == "variance") return VarianceContacts();
+  if (config.contact == "force") return ForceContacts();
+  throw std::invalid_argument("legs.contact: '" + config.contact + "' is none of kilvo, paper, variance, force");
 }
 
 // r_c of Eq. 7: velocity and position in the world, height over the ground.
@@ -30,6 +32,8 @@ ContactDetector::ContactDetector(const LegConfig& config) : detector_(make(confi
 const Contacts& ContactDetector::update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel,
                                         double sigma_v, const VoxelMap* map) {
   if (auto* paper = std::get_if<PaperContactEstimator>(&detector_)) return paper->update(feet, x, omega, accel, map);
+  if (auto* variance = std::get_if<VarianceContacts>(&detector_)) return variance->update(feet, x, accel);
+  if (auto* force = std::get_if<ForceContacts>(&detector_)) return force->update(feet, x);
   return std::get<ContactEstimator>(detector_).update(feet, x, omega, accel, sigma_v, map);
 }
 

@@ -6,6 +6,7 @@
 #include "kilvo/legs/contact_estimator.hpp"
 #include "kilvo/legs/leg_measurements.hpp"
 #include "kilvo/legs/paper_contacts.hpp"
+#include "kilvo/legs/simple_contacts.hpp"
 
 namespace kilvo {
 
@@ -27,7 +28,7 @@ class ContactDetector {
   void adapt(LegStep& step, const State& x, const Eigen::Vector3d& gyro, StanceTracker::Ground ground);
 
  private:
-  std::variant<ContactEstimator, PaperContactEstimator> detector_;
+  std::variant<ContactEstimator, PaperContactEstimator, VarianceContacts, ForceContacts> detector_;
 };
 
 }  // namespace kilvo

@@ -9,7 +9,7 @@
 namespace kilvo {
 
 struct LegConfig {
-  std::string contact = "kilvo";           // kilvo | paper
+  std::string contact = "kilvo";           // kilvo | paper | variance | force
   double lift_off_speed = 0.1;             // share of the robot's swing speed
   double touchdown_speed = 0.06;           // share of the robot's swing speed
   double impact_drop = 0.62;               // share of the speed before
@@ -26,7 +26,8 @@ struct LegConfig {
   static constexpr auto fields() {
     return std::tuple{
         Field{"contact", &LegConfig::contact, "-",
-              "how contacts are estimated; kilvo: our own way; paper: as Section V of the paper prints it, to be compared"},
+              "how contacts are estimated; kilvo: our own way. To be compared with it: paper (Section V as printed), variance (of the "
+              "acceleration), force (a threshold on what the joint efforts carry)"},
         Field{"lift_off_speed", &LegConfig::lift_off_speed, "-",
               "a foot none of whose corners is slower than this share of the robot's own swing speed has left the ground"},
         Field{"touchdown_speed", &LegConfig::touchdown_speed, "-",

@@ -1,5 +1,6 @@
 #include "kilvo/legs/leg_kinematics.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,7 +18,7 @@ constexpr double softness = 0.001;
 }  // namespace
 
 struct LegKinematics::Chains {
-  bool by_joints = true;
+  bool by_joints = true, forces = false;
   std::array<Foot, 2> feet;
   SE3 T_IL;  // the IMU's link in the IMU frame
   LegsMount mount;
@@ -30,6 +31,8 @@ struct LegKinematics::Chains {
   std::optional<std::string> look_up_planes(const std::vector<std::string>& names);
   const std::vector<double>* velocity_of(const JointSample& s);  // nullptr: not known
   FootPose pose_of(std::size_t side, const JointSample& s, const std::vector<double>& velocity);
+  std::optional<Eigen::Vector3d> force_on(std::size_t side, const JointSample& s);
+  std::vector<double> one_moves;  // all velocities zero but one
 };
 
 // Where in a message of these names each joint is.
@@ -92,8 +95,33 @@ FootPose LegKinematics::Chains::pose_of(std::size_t side, const JointSample& s, 
   return out;
 }
 
-LegKinematics::LegKinematics(const Robot& robot) : chains_(std::make_unique<Chains>()) {
+// The force in the middle of the sole that the efforts balance while nothing accelerates: effort = -J' F, J by moving one joint at a time.
+std::optional<Eigen::Vector3d> LegKinematics::Chains::force_on(std::size_t side, const JointSample& s) {
+  if (!by_joints || s.effort.size() != s.position.size()) return std::nullopt;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : feet[side].sole) middle += p / static_cast<double>(feet[side].sole.size());
+  Eigen::Matrix3d JJ = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d Jt = Eigen::Vector3d::Zero();
+  one_moves.assign(s.position.size(), 0.0);
+  const auto& others = legs[1 - side].places;
+  for (const std::size_t place : legs[side].places) {
+    if (std::ranges::find(others, place) != others.end()) continue;  // the waist carries both
+    one_moves[place] = 1;
+    const MovingFrame foot = legs[side].end(s.position, one_moves);
+    one_moves[place] = 0;
+    const Eigen::Vector3d column = foot.v + foot.omega.cross(foot.R * middle);
+    JJ += column * column.transpose();
+    Jt += column * s.effort[place];
+  }
+  JJ.diagonal().array() += 1e-6;  // a straight leg carries along itself without effort, m^2
+  const Eigen::Vector3d force = -JJ.ldlt().solve(Jt);
+  if (!force.allFinite()) return std::nullopt;
+  return T_IL.R * force;
+}
+
+LegKinematics::LegKinematics(const Robot& robot, bool forces) : chains_(std::make_unique<Chains>()) {
   Chains& c = *chains_;
+  c.forces = forces;
   c.mount = robot.legs;
   c.by_joints = robot.legs.type != "feet";
   c.feet = robot.feet;
@@ -131,6 +159,9 @@ std::variant<Feet, std::string> LegKinematics::feet(const JointSample& s) {
         return "not finite";
     }
   }
+  if (!c.forces) return out;
+  const auto left = c.force_on(0, s), right = c.force_on(1, s);
+  if (left && right) out.force_I = {*left, *right};
   return out;
 }
 

@@ -28,6 +28,8 @@ struct FootPose {
 struct Feet {
   Time t{};
   std::array<FootPose, 2> foot;  // left, right
+  /// Of the ground on each foot, as the joints' efforts say, IMU frame, N; where it is asked for and they are there.
+  std::optional<std::array<Eigen::Vector3d, 2>> force_I;
 };
 
 /// A point of a sole: a weighted mean of its corners.
@@ -43,7 +45,8 @@ SolePoint lowest_point(const FootPose& foot, const Eigen::Vector3d& up_I);
 class LegKinematics {
  public:
   /// Throws std::invalid_argument naming the link or joint when the URDF cannot be used.
-  explicit LegKinematics(const Robot& robot);
+  /// `forces`: Feet::force_I is wanted.
+  explicit LegKinematics(const Robot& robot, bool forces = false);
   LegKinematics(LegKinematics&&) noexcept;
   ~LegKinematics();
 

@@ -56,6 +56,36 @@ TEST(LegKinematics, CornersAreWhereAProductOfMatricesPutsThemThroughWaistMountAn
   }
 }
 
+// Efforts that balance a force on each foot give it back; the waist's say nothing of one foot.
+TEST(LegKinematics, EffortsGiveTheForceOnEachFoot) {
+  test::Random random(3);
+  const Robot robot = test::biped(random);
+  LegKinematics legs(robot, true);
+  for (int i = 0; i < 20; ++i) {
+    JointSample s = test::random_joints(random);
+    EXPECT_FALSE(feet_of(legs, s).force_I);
+    const std::array<Eigen::Vector3d, 2> force = {random.vector3(100), random.vector3(100)};
+    const auto middle = [&](const JointSample& at, std::size_t side) {
+      Eigen::Vector3d out = Eigen::Vector3d::Zero();
+      for (const Eigen::Vector3d& p : robot.feet[side].sole) out += test::foot_in_imu(robot, at, side) * p / 4;
+      return out;
+    };
+    constexpr double h = 1e-6;
+    s.effort.assign(s.position.size(), 0.0);
+    for (std::size_t j = 0; j < s.position.size(); ++j) {
+      JointSample before = s, after = s;
+      before.position[j] -= h;
+      after.position[j] += h;
+      for (std::size_t side = 0; side < 2; ++side) {
+        s.effort[j] -= (middle(after, side) - middle(before, side)).dot(force[side]) / (2 * h);
+      }
+    }
+    const auto known = feet_of(legs, s).force_I;
+    ASSERT_TRUE(known);
+    for (std::size_t side = 0; side < 2; ++side) EXPECT_LT(((*known)[side] - force[side]).norm(), 0.05 * force[side].norm());
+  }
+}
+
 TEST(LegKinematics, VelocitiesAreTheDerivativesOfThePositions) {
   test::Random random(2);
   LegKinematics legs(test::biped(random));
