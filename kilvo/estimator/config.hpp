@@ -4,7 +4,7 @@
 #include <tuple>
 
 #include "kilvo/filter/predict.hpp"
-#include "kilvo/filter/update.hpp"
+#include "kilvo/filter/update_config.hpp"
 #include "kilvo/legs/leg_config.hpp"
 #include "kilvo/lidar/lidar_config.hpp"
 #include "kilvo/map/visual_map.hpp"

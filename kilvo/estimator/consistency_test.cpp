@@ -6,6 +6,7 @@
 #include <span>
 
 #include "kilvo/estimator/estimator.hpp"
+#include "kilvo/filter/update.hpp"
 #include "kilvo/lidar/undistort.hpp"
 #include "lab/simulation/analytic_room.hpp"
 #include "tests/helpers/exact_map.hpp"

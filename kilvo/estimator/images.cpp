@@ -6,6 +6,7 @@
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/estimator/stopwatch.hpp"
 #include "kilvo/filter/pose_error.hpp"
+#include "kilvo/filter/update.hpp"
 #include "kilvo/vision/colours.hpp"
 #include "kilvo/vision/depth_view.hpp"
 #include "kilvo/vision/new_points.hpp"

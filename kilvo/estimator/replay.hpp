@@ -7,6 +7,7 @@
 
 #include "kilvo/estimator/config.hpp"
 #include "kilvo/estimator/recent.hpp"
+#include "kilvo/filter/gain.hpp"
 #include "kilvo/filter/trajectory.hpp"
 #include "kilvo/legs/leg_measurements.hpp"
 
