@@ -1,15 +1,16 @@
 # One word per task; each does all its own set-up.
-#   make build      the program: build/release/bin/kilvo
-#   make demo       simulate a small room, run on it, evaluate, show it
-#   make test       build and run every test
+#   make build      the programs: build/release/bin/kilvo, and the nodes whose libraries are here
+#   make demo       simulate a humanoid that walks through a room, run on it, compare with the truth, show it
+#   make test       install the tests' packages, build and run every test
 #   make bench      time the functions; RECORDINGS=DIR: time and judge whole recordings as well
 #   make tables     RECORDINGS=DIR: every modality on every recording, as Markdown
-#   make check      layout, walls, sizes, headers, clang-tidy (files that changed since they last passed; ALL=1: every file)
+#   make check      layout, modules, sizes, headers, clang-tidy (files that changed since they last passed; ALL=1: every file)
 #   make format     rewrite the sources in the one layout
 #   make fuzz       fuzz the readers, SECONDS_EACH=60 each
 #   make install    into PREFIX=/usr/local
+#   make package    Debian packages in build/package
 #   make clean      remove build/
-.PHONY: build demo test bench tables check format fuzz install clean dependencies dependencies-dev configure
+.PHONY: build demo test bench tables check format fuzz install package clean dependencies-run dependencies dependencies-dev configure configure-program
 .NOTPARALLEL:
 .DEFAULT_GOAL := build
 
@@ -19,6 +20,9 @@ PREFIX ?= /usr/local
 SECONDS_EACH ?= 60
 SOURCES = $(shell find kilvo lab apps tests bench -name '*.hpp' -o -name '*.cpp')
 
+dependencies-run:
+	@scripts/install_dependencies --run
+
 dependencies:
 	@scripts/install_dependencies
 
@@ -26,18 +30,27 @@ dependencies-dev:
 	@scripts/install_dependencies --dev
 
 configure: dependencies
-	cmake --preset release
+	@cmake --preset release
 
-build: configure
+# Needs no package of the tests; a folder that was configured for them stays so.
+configure-program: dependencies-run
+	@grep -qs '^build build.ninja:' $(BUILD)/build.ninja || cmake --preset release -D BUILD_TESTING=OFF -D KILVO_BUILD_BENCHMARKS=OFF --log-level=WARNING
+
+build: configure-program
+	@cmake --build --preset release --target programs
+
+demo: configure-program
+	@echo "compiling the kilvo program: two to four minutes on two cores"
+	@cmake --build --preset release --target kilvo_cli
+	@$(KILVO) demo
+
+test: configure
+	@echo "compiling the programs, tests and benchmarks: about ten minutes on two cores"
 	cmake --build --preset release
-
-demo: build
-	$(KILVO) demo
-
-test: build
 	ctest --preset release
 
-bench: build
+bench: configure
+	cmake --build --preset release --target kilvo_bench_micro kilvo_cli
 	$(BUILD)/bench/micro/kilvo_bench_micro
 ifdef RECORDINGS
 	bench/macro/run --kilvo $(KILVO) $(RECORDINGS)
@@ -50,7 +63,7 @@ check: dependencies-dev configure
 	@scripts/check_modules
 	@scripts/check_sizes
 	@clang-format-14 --dry-run --Werror $(SOURCES)
-	cmake --build --preset release --target all_verify_interface_header_sets
+	@scripts/check_headers --build $(BUILD)
 	@scripts/check_tidy --build $(BUILD) $(if $(ALL),--all)
 
 format: dependencies-dev

@@ -1,7 +1,7 @@
 # kilvo_module(NAME [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
 #
-# One folder is one module is one CMake target, `kilvo_NAME` (alias `kilvo::NAME`): every *.cpp is compiled, every *.hpp is in
-# the header set (and, verified, compiles alone), every *_test.cpp beside it goes into one test program `kilvo_NAME_test`.
+# One folder is one module is one CMake target, `kilvo_NAME` (alias `kilvo::NAME`): every *.cpp is compiled,
+# every *_test.cpp beside it goes into one test program `kilvo_NAME_test`. Every *.hpp compiles alone (scripts/check_headers).
 # What a module may include is said in modules.txt and checked by scripts/check_modules.
 
 add_library(kilvo_flags INTERFACE)
@@ -23,7 +23,6 @@ function(kilvo_module name)
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   file(GLOB tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp)
   file(GLOB fuzzers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_fuzz.cpp)
-  file(GLOB headers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.hpp)
   if(tests)
     list(REMOVE_ITEM sources ${tests})
   endif()
@@ -36,13 +35,14 @@ function(kilvo_module name)
     add_library(${target} STATIC ${sources})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:kilvo_flags> ${MODULE_PRIVATE})
+    kilvo_precompile(${target})
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
   endif()
   add_library(kilvo::${name} ALIAS ${target})
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON)
-  target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${headers})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  target_include_directories(${target} ${scope} $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(${target} ${scope} cxx_std_20)
   target_link_libraries(${target} ${scope} ${MODULE_DEPENDS})
 
@@ -50,6 +50,7 @@ function(kilvo_module name)
     add_executable(${target}_test ${tests})
     target_link_libraries(${target}_test PRIVATE ${target} kilvo_flags ${MODULE_PRIVATE} ${MODULE_TEST_DEPENDS} GTest::gmock GTest::gtest_main)
     target_compile_definitions(${target}_test PRIVATE KILVO_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+    kilvo_precompile(${target}_test TEST)
     gtest_discover_tests(${target}_test TEST_PREFIX ${name}/ DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
   endif()
   if(fuzzers AND KILVO_BUILD_FUZZERS)

@@ -1,9 +1,16 @@
 # `cmake --install` gives a package that another project uses with find_package(kilvo); the target is kilvo::kilvo.
 include(CMakePackageConfigHelpers)
 
+if(TARGET programs)
+  add_dependencies(programs ${KILVO_MODULE_TARGETS})
+endif()
 install(TARGETS ${KILVO_MODULE_TARGETS} EXPORT kilvoTargets
-        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
-        FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+foreach(module ${KILVO_MODULE_TARGETS})
+  get_target_property(folder ${module} SOURCE_DIR)
+  file(RELATIVE_PATH path ${PROJECT_SOURCE_DIR} ${folder})
+  install(DIRECTORY ${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/${path} FILES_MATCHING PATTERN "*.hpp")
+endforeach()
 install(EXPORT kilvoTargets NAMESPACE kilvo:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/kilvo)
 configure_package_config_file(cmake/kilvoConfig.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/kilvoConfig.cmake
                               INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/kilvo)

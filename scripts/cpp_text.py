@@ -1,4 +1,5 @@
 """Reads C++ source well enough for the checks of this folder: no comments or strings in the way, and which brace opens what."""
+import hashlib
 import os
 import re
 from typing import Iterator, NamedTuple
@@ -24,6 +25,29 @@ def is_test(path: str) -> bool:
 def read(root: str, path: str) -> str:
     with open(os.path.join(root, path), encoding="utf-8") as file:
         return file.read()
+
+
+def project_files(root: str, path: str, seen: set[str] | None = None) -> set[str]:
+    """`path` and every header of the project that it includes, directly or not."""
+    seen = set() if seen is None else seen
+    if path not in seen and os.path.isfile(os.path.join(root, path)):
+        seen.add(path)
+        for header in re.findall(r'^\s*#\s*include\s*"([^"]+)"', read(root, path), re.M):
+            project_files(root, header, seen)
+    return seen
+
+
+def fingerprint(root: str, path: str, others: list[str], command: str) -> str:
+    """Of a source with all that it includes, of `others` and of how it is compiled."""
+    digest = hashlib.sha256(command.encode())
+    for name in [*others, *sorted(project_files(root, path))]:
+        digest.update(read(root, name).encode())
+    return digest.hexdigest()
+
+
+def without_precompiled(command: str) -> str:
+    """A compile command that reads its headers from source."""
+    return re.sub(r" -Winvalid-pch| -include \S*cmake_pch\.hxx", "", command)
 
 
 _LEXEME = re.compile(

@@ -8,7 +8,7 @@ import unittest
 from planted_tree import SCRIPTS
 
 SCRIPT = os.path.join(SCRIPTS, "install_dependencies")
-TOOLS = ("bash", "sh", "grep", "sed", "id", "env", "mktemp", "rm", "cat")
+TOOLS = ("bash", "sh", "grep", "sed", "id", "env", "mktemp", "rm", "cat", "tee")
 
 # Says that everything is installed but the packages in the file `missing`.
 DPKG_QUERY = """#!/bin/bash
@@ -18,6 +18,7 @@ for p in "$@"; do case "$p" in -*|*'$'*) ;; *) grep -qxF "$p" "$HERE/missing" ||
 APT_GET = """#!/bin/bash
 echo "$@" >> "$HERE/calls"
 case "$*" in *install*)
+  echo 'dlstatus:1:40.1:Retrieving file 1 of 2'; echo 'pmstatus:libpng-dev:100.0:Installed libpng-dev'
   if [ -s "$HERE/failures" ]; then sed -i 1d "$HERE/failures"; echo 'E: Unable to locate package' >&2; exit 100; fi ;;
 esac
 """
@@ -62,6 +63,10 @@ class InstallDependencies(unittest.TestCase):
         self.write("missing", "libpng-dev\nlibgtest-dev\nclang\n")
         self.assertEqual(self.run_script().returncode, 0)
         self.assertRegex(self.apt_calls()[-1], r"install -y --no-install-recommends libpng-dev libgtest-dev$")
+
+    def test_tells_how_far_it_is(self):
+        self.write("missing", "libpng-dev\n")
+        self.assertEqual(self.run_script().stdout.splitlines()[1:], ["  downloading: 25 %", "  unpacking and setting up: 100 %"])
 
     def test_to_run_it_needs_no_test_library(self):
         self.write("missing", "libpng-dev\nlibgtest-dev\n")
