@@ -1,4 +1,5 @@
 // kilvo: the door for a person at a command line.
+#include <algorithm>
 #include <fmt/core.h>
 #include <new>
 #include <string_view>
@@ -33,6 +34,7 @@ int parse_and_do(const std::vector<std::string>& words) {
   add_run(program, chosen);
   add_info(program, chosen);
   add_eval(program, chosen);
+  add_compare(program, chosen);
   add_eval_contacts(program, chosen);
   add_report(program, chosen);
   add_config(program, chosen);
@@ -68,13 +70,23 @@ int fail(ExitCode code, std::string_view why) {
   return code;
 }
 
+// Of a configuration all mistakes are told, a line each.
+int fail_lines(ExitCode code, std::string_view why) {
+  for (std::size_t begin = 0; begin <= why.size();) {
+    const std::size_t end = std::min(why.find('\n', begin), why.size());
+    fail(code, why.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return code;
+}
+
 int run_program(const std::vector<std::string>& words) {
   try {
     return parse_and_do(words);
   } catch (const UsageError& e) {
     return fail(wrong_usage, e.what());
   } catch (const lab::ConfigError& e) {
-    return fail(wrong_usage, e.what());
+    return fail_lines(wrong_usage, e.what());
   } catch (const lab::OutputError& e) {
     return fail(wrong_usage, e.what());
   } catch (const lab::TrajectoryOutputError& e) {

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include "lab/settings/nearest.hpp"
+#include "lab/settings/problems.hpp"
 #include "lab/settings/setting_list.hpp"
 #include "lab/settings/urdf_names.hpp"
 
@@ -35,38 +36,40 @@ void check_value(const Settings& s, const Setting& setting) {
   }
 }
 
-void check_together(const Settings& s) {
+void check_together(const Settings& s, Problems& problems) {
+  const auto complain = [&](const std::string& key, const std::string& why) { problems.collect([&] { refuse(s, key, why); }); };
   // Which of the two a user touched is where to point at.
   const auto touched = [&s](const char* one, const char* other) { return s.given.contains(one) ? one : other; };
   const double cell = s.estimator.lidar.voxel_size, voxel = s.estimator.map.voxel_size;
   if (cell > voxel / 4 * (1 + 1e-9)) {
-    refuse(s, touched("lidar.voxel_size", "map.voxel_size"),
-           fmt::format("lidar.voxel_size ({}) must be at most a quarter of map.voxel_size ({})", cell, voxel));
+    complain(touched("lidar.voxel_size", "map.voxel_size"),
+             fmt::format("lidar.voxel_size ({}) must be at most a quarter of map.voxel_size ({})", cell, voxel));
   }
   const LidarMount& lidar = s.robot.lidar;
   if (lidar.min_range >= lidar.max_range) {
-    refuse(s, touched("lidar.min_range", "lidar.max_range"),
-           fmt::format("lidar.min_range ({}) must be below lidar.max_range ({})", lidar.min_range, lidar.max_range));
+    complain(touched("lidar.min_range", "lidar.max_range"),
+             fmt::format("lidar.min_range ({}) must be below lidar.max_range ({})", lidar.min_range, lidar.max_range));
   }
   const MapConfig& map = s.estimator.map;
   if (map.full_points < map.min_points) {
-    refuse(s, touched("map.full_points", "map.min_points"),
-           fmt::format("map.full_points ({}) must not be below map.min_points ({})", map.full_points, map.min_points));
+    complain(touched("map.full_points", "map.min_points"),
+             fmt::format("map.full_points ({}) must not be below map.min_points ({})", map.full_points, map.min_points));
   }
   const std::size_t n = s.robot.camera.distortion.size();
   const bool radtan = s.robot.camera.model == "pinhole_radtan";
   if (n != 0 && n != 4 && !(radtan && n == 5)) {
-    refuse(s, "camera.distortion", fmt::format("must have {} numbers for {}, not {}", radtan ? "4 or 5" : "4", s.robot.camera.model, n));
+    complain("camera.distortion", fmt::format("must have {} numbers for {}, not {}", radtan ? "4 or 5" : "4", s.robot.camera.model, n));
   }
 }
 
-void check_names(const Settings& s) {
+void check_names(const Settings& s, Problems& problems) {
   if (s.robot.urdf.empty()) return;
   const UrdfNames names = find_urdf_names(s.robot.urdf);
   if (names.links.empty()) refuse(s, "robot.urdf", fmt::format("{} has no links: not a URDF file", s.urdf_file));
   const auto check = [&](const std::string& key, const std::string& name, const std::vector<std::string>& valid, const char* what) {
     if (!name.empty() && std::ranges::find(valid, name) == valid.end()) {
-      refuse(s, key, fmt::format("{} has no {} '{}', nearest is '{}'", s.urdf_file, what, name, nearest(name, valid)));
+      problems.collect(
+          [&] { refuse(s, key, fmt::format("{} has no {} '{}', nearest is '{}'", s.urdf_file, what, name, nearest(name, valid))); });
     }
   };
   for (const Foot& foot : s.robot.feet) check("robot.feet", foot.link, names.links, "link");
@@ -101,15 +104,18 @@ std::vector<std::string> required_keys(const Settings& s, Sensor sensor) {
 }  // namespace
 
 void check_settings(const Settings& settings) {
+  Problems problems;
   Settings copy = settings;
   for (const Setting& setting : list_settings(copy)) {
-    if (settings.given.contains(setting.key)) check_value(settings, setting);
+    if (settings.given.contains(setting.key)) problems.collect([&] { check_value(settings, setting); });
   }
-  check_together(settings);
-  check_names(settings);
+  if (problems.none()) check_together(settings, problems);
+  problems.collect([&] { check_names(settings, problems); });
+  problems.report();
 }
 
 void require_complete(const Settings& settings, std::span<const Sensor> used) {
+  Problems problems;
   for (const Sensor sensor : used) {
     for (const std::string& key : required_keys(settings, sensor)) {
       if (!settings.given.contains(key)) {
@@ -118,10 +124,13 @@ void require_complete(const Settings& settings, std::span<const Sensor> used) {
         for (const auto& [other, where] : settings.given) {
           if (!where.starts_with("--set")) file = where.substr(0, where.rfind(':')) + ": ";
         }
-        throw ConfigError(fmt::format("{}{} is missing: the sensor '{}' cannot be used without it", file, key, name_of(sensor)));
+        problems.collect([&] {
+          throw ConfigError(fmt::format("{}{} is missing: the sensor '{}' cannot be used without it", file, key, name_of(sensor)));
+        });
       }
     }
   }
+  problems.report();
 }
 
 }  // namespace kilvo::lab

@@ -7,6 +7,8 @@
 
 #include "lab/settings/check_settings.hpp"
 #include "lab/settings/nearest.hpp"
+#include "lab/settings/pose_forms.hpp"
+#include "lab/settings/problems.hpp"
 #include "lab/settings/urdf_names.hpp"
 #include "lab/settings/value.hpp"
 
@@ -39,7 +41,7 @@ std::string joined(const std::string& prefix, const std::string& name) { return 
 /// Walks a YAML tree and stores what it finds; says where.
 class Reader {
  public:
-  explicit Reader(Settings& settings) : settings_(settings), list_(list_settings(settings)) {
+  Reader(Settings& settings, Problems& problems) : settings_(settings), problems_(problems), list_(list_settings(settings)) {
     for (const Setting& s : list_) {
       names_.push_back(s.key);
       for (std::size_t dot = s.key.find('.'); dot != std::string::npos; dot = s.key.find('.', dot + 1))
@@ -84,27 +86,68 @@ class Reader {
       const int line = pair.first.Mark().line + 1;
       const std::string name = pair.first.IsScalar() ? pair.first.Scalar() : std::string("?");
       const std::string key = joined(prefix, name);
-      if (!seen.insert(name).second) throw ConfigError(fmt::format("{}: {}: given twice", place(line), key));
-      read_node(key, pair.second, line);
+      problems_.collect([&] {
+        if (!seen.insert(name).second) throw ConfigError(fmt::format("{}: {}: given twice", place(line), key));
+        read_node(key, pair.second, line);
+      });
     }
   }
 
   void read_node(const std::string& key, const YAML::Node& node, int line) {
     const auto setting = std::ranges::find(list_, key, &Setting::key);
     if (setting != list_.end()) {
-      try {
-        read_value(node, setting->value);
-      } catch (const BadValue& bad) {
-        throw ConfigError(fmt::format("{}: {}: {}", place(bad.line > 0 ? bad.line : line), key, bad.what()));
-      }
-      settings_.given[key] = place(line);
+      read_into(*setting, "R", node, line);
+    } else if (const Setting* rotation = rotation_of(key)) {
+      read_into(*rotation, key.substr(key.rfind('.') + 1), node, line);
     } else if (!sections_.contains(key)) {
-      throw ConfigError(fmt::format("{}: {}: no such setting, nearest is {}", place(line), key, nearest_name(key)));
+      refuse_unknown(key, node, line);
     } else if (node.IsMap()) {
       read_section(node, key);
     } else if (!node.IsNull()) {  // a section with nothing in it is fine
       throw ConfigError(fmt::format("{}: {}: must be a map of settings", place(line), key));
     }
+  }
+
+  /// `form`: how a rotation is written.
+  void read_into(const Setting& setting, const std::string& form, const YAML::Node& node, int line) {
+    const auto* rotation = std::get_if<SO3*>(&setting.value);
+    if (rotation != nullptr && settings_.given.contains(setting.key) && !is_override_)
+      throw ConfigError(fmt::format("{}: {}: the rotation is given twice: one of R, q, rpy", place(line), setting.key));
+    try {
+      if (rotation != nullptr) {
+        **rotation = read_rotation_form(form, node);
+      } else {
+        read_value(node, setting.value);
+      }
+    } catch (const BadValue& bad) {
+      const std::string key = rotation == nullptr ? setting.key : setting.key.substr(0, setting.key.rfind('.') + 1) + form;
+      throw ConfigError(fmt::format("{}: {}: {}", place(bad.line > 0 ? bad.line : line), key, bad.what()));
+    }
+    settings_.given[setting.key] = place(line);
+  }
+
+  /// The rotation that lidar.T_imu_lidar.q or .rpy is another form of.
+  const Setting* rotation_of(const std::string& key) const {
+    const std::size_t dot = key.rfind('.');
+    if (dot == std::string::npos || (key.substr(dot) != ".q" && key.substr(dot) != ".rpy")) return nullptr;
+    const auto setting = std::ranges::find(list_, key.substr(0, dot) + ".R", &Setting::key);
+    return setting == list_.end() || !std::holds_alternative<SO3*>(setting->value) ? nullptr : &*setting;
+  }
+
+  [[noreturn]] void refuse_unknown(const std::string& key, const YAML::Node& node, int line) const {
+    const std::size_t dot = key.rfind('.');
+    const std::string section = dot == std::string::npos ? "" : key.substr(0, dot + 1);
+    const std::optional<std::string> opposite = opposite_pose(key.substr(section.size()));
+    if (opposite && sections_.contains(section + *opposite)) {
+      std::string conversion;
+      try {
+        conversion = fmt::format("; the inverse of the pose given is {}: {}", *opposite, inverse_pose_text(node));
+      } catch (const BadValue&) {  // then it has other faults as well
+      }
+      throw ConfigError(fmt::format("{}: {}: must be {}, which takes a point of the second frame into the first{}", place(line), key,
+                                    section + *opposite, conversion));
+    }
+    throw ConfigError(fmt::format("{}: {}: no such setting, nearest is {}", place(line), key, nearest_name(key)));
   }
 
   // A right name in the wrong section is a likelier slip than any wrong letter.
@@ -117,6 +160,7 @@ class Reader {
   }
 
   Settings& settings_;
+  Problems& problems_;
   std::vector<Setting> list_;
   std::set<std::string> sections_;
   std::vector<std::string> names_;  // of settings and sections
@@ -142,11 +186,13 @@ void read_urdf(Settings& s, const fs::path& folder) {
 
 Settings parse_settings(const std::string& yaml, const std::string& name, const fs::path& folder, std::span<const std::string> overrides) {
   Settings settings;
-  Reader reader(settings);
+  Problems problems;
+  Reader reader(settings, problems);
   reader.read_document(yaml, name);
-  for (const std::string& text : overrides) reader.read_override(text);
-  read_urdf(settings, folder);
-  check_settings(settings);
+  for (const std::string& text : overrides) problems.collect([&] { reader.read_override(text); });
+  problems.collect([&] { read_urdf(settings, folder); });
+  problems.collect([&] { check_settings(settings); });
+  problems.report();
   return settings;
 }
 

@@ -116,6 +116,42 @@ TEST(Settings, ARotationMustBeOne) {
   EXPECT_THAT(with("[1, 0, 0, 0, 1, 0, 0, 0, nan]"), HasSubstr("must be a finite number"));
 }
 
+TEST(Settings, ReadsQuaternionsAndRollPitchYawAsTheMatrixThatTheyAre) {
+  const auto R = [](const std::string& form) {
+    return parse_settings("lidar: {T_imu_lidar: {p: [0, 0, 0], " + form + "}}", "robot.yaml", "/").robot.lidar.T_imu_lidar.R.matrix();
+  };
+  const Eigen::Matrix3d quarter_about_z = (Eigen::Matrix3d() << 0, -1, 0, 1, 0, 0, 0, 0, 1).finished();
+  EXPECT_LT((R("q: [0, 0, 0.70710678, 0.70710678]") - quarter_about_z).norm(), 1e-7);
+  EXPECT_LT((R("rpy: [0, 0, 1.5707963268]") - quarter_about_z).norm(), 1e-9);
+  EXPECT_LT((R("R: [[0, -1, 0], [1, 0, 0], [0, 0, 1]]") - quarter_about_z).norm(), 1e-12);
+  // Roll first, then pitch, both about fixed axes: z goes to -y, and stays there.
+  EXPECT_LT((R("rpy: [1.5707963268, 1.5707963268, 0]").col(2) - Eigen::Vector3d(0, -1, 0)).norm(), 1e-9);
+}
+
+TEST(Settings, ARotationOfAnotherFormIsRefusedWithTheReason) {
+  const auto with = [](const std::string& form) { return error_of("lidar:\n  T_imu_lidar:\n    " + form + "\n"); };
+  EXPECT_EQ(with("rpy: [0, 0, 90]"),
+            "robot.yaml:3: lidar.T_imu_lidar.rpy: must be in radians: 90 is more than a turn; 90 degrees are 1.57079633 radians");
+  EXPECT_THAT(with("q: [1, 0, 0]"), HasSubstr("must be a quaternion of 4 numbers (x, y, z, w)"));
+  EXPECT_THAT(with("q: [1, 1, 0, 0]"), HasSubstr("the quaternion's norm is 1.414, not 1"));
+  EXPECT_THAT(with("q: [0, 0, 0, 1]\n    rpy: [0, 0, 0]"), HasSubstr("the rotation is given twice: one of R, q, rpy"));
+}
+
+TEST(Settings, APoseOfTheOppositeDirectionIsAnsweredWithItsInverse) {
+  EXPECT_EQ(
+      error_of("lidar:\n  T_lidar_imu: {p: [1, 2, 3], rpy: [0, 0, 1.57079632679489662]}\n"),
+      "robot.yaml:2: lidar.T_lidar_imu: must be lidar.T_imu_lidar, which takes a point of the second frame into the first; the inverse of "
+      "the pose given is T_imu_lidar: {p: [-2, 1, -3], R: [0, 1, 0, -1, 0, 0, 0, 0, 1]}");
+}
+
+TEST(Settings, AllMistakesAreToldAtOnce) {
+  EXPECT_EQ(error_of("lidar:\n  voxel_size: big\n  rate: 0\ncamera:\n  topik: /c\n", {"map.radius=-1"}),
+            "robot.yaml:2: lidar.voxel_size: must be a number, not 'big'\n"
+            "robot.yaml:5: camera.topik: no such setting, nearest is camera.topic\n"
+            "robot.yaml:3: lidar.rate: must be above 0, at most 1000, not 0\n"
+            "--set map.radius=-1: map.radius: must be above 0, at most 10000, not -1");
+}
+
 TEST(Settings, ANearlyRotationIsMadeOne) {
   const Settings s = parse("lidar: {T_imu_lidar: {R: [0.9992, 0, -0.0401, 0, -1, 0, -0.0401, 0, -0.9992]}}");
   const Eigen::Matrix3d R = s.robot.lidar.T_imu_lidar.R.matrix();

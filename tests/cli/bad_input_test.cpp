@@ -18,11 +18,11 @@ constexpr double nan_d = std::numeric_limits<double>::quiet_NaN();
 
 class BadInput : public Story {
  protected:
-  /// The program says one line and ends with `code`; nothing of a run is left behind.
-  void expect_refused(const Finished& f, int code, const std::string& text) const {
+  /// The program prints as many lines as there are mistakes and ends with `code`; nothing of a run is left behind.
+  void expect_refused(const Finished& f, int code, const std::string& text, int lines = 1) const {
     EXPECT_EQ(f.code, code) << f.err;
     EXPECT_THAT(f.err, AllOf(StartsWith("kilvo: error: "), HasSubstr(text)));
-    EXPECT_EQ(std::count(f.err.begin(), f.err.end(), '\n'), 1) << f.err;
+    EXPECT_EQ(std::count(f.err.begin(), f.err.end(), '\n'), lines) << f.err;
     EXPECT_FALSE(fs::exists(folder / "out/odometry.tum"));
   }
   void expect_finite_and_sorted() const {
@@ -57,6 +57,14 @@ TEST_F(BadInput, AWrongTopicNamesTheNearest) {
   expect_refused(run({"--set", "imu.topic=/imv"}), 3, "nearest is /imu");
   expect_refused(run({"--set", "lidar.topic=/point"}), 3, "nearest is /points");  // no LiDAR, no legs
   expect_refused(run({"--set", "lidar.topic=/point", "--set", "imu.topic=/imv"}), 3, "none of the topics");
+}
+
+TEST_F(BadInput, AMisspeltTopicIsNoAbsentSensor) {
+  record(small_walk(2).measurements);
+  write_text(folder / "legs_too.yaml", small_config() + "legs: {topic: /joints}\n");
+  expect_refused(run({"--set", "lidar.topic=/point"}), 3, "/points is of that kind: --set lidar.topic=/points");
+  // No message in it could be of legs: they are not there, and the run goes on without them.
+  EXPECT_THAT(kilvo({"run", recording(), "--config", folder / "legs_too.yaml", "--out", out()}).err, HasSubstr("no topic /joints (legs)"));
 }
 
 TEST_F(BadInput, ATopicOfAnotherType) {
@@ -187,7 +195,9 @@ TEST_F(BadInput, AConfigurationErrorNamesFileLineKeyAndTheNearest) {
              "imu: {topic: /imu}\nlidar:\n  topic: /points\n  T_imu_lidar:\n    p: [0, 0, 0]\n    R: [1, 0, 0, 0, 1, 0, 0, 0, 2]\n");
   expect_refused(run(), 2, config() + ":6: lidar.T_imu_lidar.R: is not a rotation");
   write_text(config(), "imu: {topic: /imu}\nlidar:\n  topic: /points\n");
-  expect_refused(run(), 2, "lidar.T_imu_lidar.p is missing");
+  expect_refused(run(), 2, "lidar.T_imu_lidar.p is missing", 2);
+  write_text(config(), small_config() + "  voxel_size: small\n  voxel_sise: 0.2\n");
+  expect_refused(run(), 2, config() + ":9: lidar.voxel_sise: no such setting", 2);
   write_text(config(), "robot: {urdf: nowhere.urdf}\n");
   expect_refused(run(), 2, "nowhere.urdf: no such URDF file");
   fs::copy_file(recording(), config(), fs::copy_options::overwrite_existing);
