@@ -1,4 +1,5 @@
 // kilvo eval EST.tum GT.tum
+#include <filesystem>
 #include <fmt/core.h>
 #include <memory>
 
@@ -16,19 +17,32 @@ struct EvalOptions {
   bool json = false;
 };
 
-int evaluate_files(const EvalOptions& options) {
-  const auto alignment = lab::alignment_of(options.align);
-  if (!alignment) {
-    const std::vector<std::string> names{"se3", "yaw", "first"};
-    throw UsageError(
-        fmt::format("--align must be se3, yaw or first, not '{}', nearest is '{}'", options.align, lab::nearest(options.align, names)));
+// A run without LiDAR has no sweeps; its poses are beside them.
+std::vector<lab::StampedPose> read_estimate(const std::string& path) {
+  std::vector<lab::StampedPose> poses = lab::read_tum(path);
+  const std::filesystem::path odometry = std::filesystem::path(path).parent_path() / "odometry.tum";
+  std::error_code error;
+  if (poses.empty() && std::filesystem::path(path).filename() == "sweeps.tum" && std::filesystem::exists(odometry, error)) {
+    throw lab::EvaluationError(
+        fmt::format("{}: no poses in it: the run had no LiDAR sweeps; evaluate {} instead", path, odometry.string()));
   }
-  const lab::Evaluation result = lab::evaluate(lab::read_tum(options.estimate), lab::read_tum(options.truth), *alignment);
+  return poses;
+}
+
+int evaluate_files(const EvalOptions& options) {
+  const lab::Alignment alignment = alignment_or_refuse(options.align);
+  const lab::Evaluation result = lab::evaluate(read_estimate(options.estimate), lab::read_tum(options.truth), alignment);
   fmt::print("{}", options.json ? lab::to_json(result) : lab::to_text(result));
   return done;
 }
 
 }  // namespace
+
+lab::Alignment alignment_or_refuse(const std::string& name) {
+  if (const auto alignment = lab::alignment_of(name)) return *alignment;
+  const std::vector<std::string> names{"se3", "yaw", "first"};
+  throw UsageError(fmt::format("--align must be se3, yaw or first, not '{}', nearest is '{}'", name, lab::nearest(name, names)));
+}
 
 void add_eval(CLI::App& program, Action& chosen) {
   auto options = std::make_shared<EvalOptions>();

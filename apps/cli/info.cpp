@@ -2,12 +2,17 @@
 #include <algorithm>
 #include <fmt/core.h>
 #include <memory>
+#include <set>
 
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/sensor_choice.hpp"
 #include "apps/cli/shipped_config.hpp"
 #include "apps/cli/verbs.hpp"
+#include "kilvo/legs/joint_chain.hpp"
+#include "lab/messages/input_error.hpp"
 #include "lab/recordings/description.hpp"
+#include "lab/recordings/recording_source.hpp"
+#include "lab/settings/nearest.hpp"
 
 namespace kilvo::cli {
 namespace {
@@ -41,6 +46,40 @@ void print_topics(const lab::RecordingDescription& about) {
   }
 }
 
+// The first leg message against the joints that the URDF has between the IMU and the feet.
+void print_joints(const InfoOptions& options, const lab::Settings& settings, const lab::RecordingOptions& wanted) {
+  const Robot& robot = settings.robot;
+  if (!settings.has(Sensor::legs) || robot.legs.type != "joints" || robot.urdf.empty() || robot.imu.link.empty()) return;
+  lab::RecordingOptions only_legs = wanted;
+  for (const Sensor sensor : every_sensor) only_legs[sensor].use = sensor == Sensor::legs;
+  std::optional<JointSample> first;
+  try {
+    lab::RecordingSource source(options.input, only_legs);
+    while (auto measurement = source.next()) {
+      if (const auto* sample = std::get_if<JointSample>(&*measurement)) {
+        first = *sample;
+        break;
+      }
+    }
+  } catch (const lab::InputError&) {
+    return;  // the table above says that there is no such topic
+  }
+  if (!first) return;
+  const LinkTree tree(robot);
+  std::set<std::string> needed, missing;
+  for (const Foot& foot : robot.feet) {
+    for (const std::string& joint : tree.chain(robot.imu.link, foot.link).names) needed.insert(joint);
+  }
+  for (const std::string& joint : needed) {
+    if (std::ranges::find(first->names, joint) == first->names.end()) missing.insert(joint);
+  }
+  fmt::print("joints: {} of the {} between {} and the feet in {} are in {}\n", needed.size() - missing.size(), needed.size(),
+             robot.imu.link, settings.urdf_file, settings.topic(Sensor::legs));
+  for (const std::string& joint : missing)
+    fmt::print("  {} is not in the messages, nearest is {}; robot.locked_joints if it does not move\n", joint,
+               lab::nearest(joint, first->names));
+}
+
 int info(const InfoOptions& options) {
   const auto config = config_file(options.config.empty() ? std::nullopt : std::optional(options.config), options.input);
   const lab::Settings settings = lab::load_settings(config);
@@ -54,6 +93,7 @@ int info(const InfoOptions& options) {
              to_seconds(about.end - about.begin), about.messages, about.chunks, about.compression);
   fmt::print("use: with {}\n", config.string());
   print_topics(about);
+  print_joints(options, settings, wanted);
   for (const lab::Damage& damage : about.damages) fmt::print("damaged at byte {}: {}\n", damage.offset, damage.reason);
   return done;
 }

@@ -15,6 +15,7 @@
 #include "apps/cli/result_files.hpp"
 #include "apps/cli/sensor_choice.hpp"
 #include "apps/cli/shipped_config.hpp"
+#include "apps/cli/skeleton_file.hpp"
 #include "apps/cli/summary.hpp"
 #include "apps/live/live_runner.hpp"
 #include "kilvo/estimator/estimator.hpp"
@@ -66,6 +67,7 @@ class Run {
         estimator_(make_estimator(settings_, choice.used)),
         map_(settings_.mapping, options.threads > 1 || options.realtime),
         files_(options.out, settings_.estimator.smooth_time),
+        skeleton_(options.out / "skeleton.csv", settings_.robot),
         progress_(Progress::style_for(options.quiet)) {
     if (!options.quiet) tell_start(facts_, source_, options.no_deskew);
   }
@@ -75,6 +77,7 @@ class Run {
     progress_.finish();
     files_.write_events(estimator_.take_events());
     files_.close();
+    skeleton_.close();
     facts_.failure = failure(interrupted);
     for (const Sensor sensor : facts_.sensors) facts_.withheld[static_cast<std::size_t>(sensor)] = failing_.dropped(sensor);
     const lab::MapBuilder& map = map_.finish();
@@ -94,6 +97,7 @@ class Run {
     bool interrupted = false;
     while (auto measurement = input.next()) {
       require_legs(*measurement);
+      skeleton_.add(*measurement);
       keep(estimator_.push(*std::move(measurement)));
       progress_.update(input.progress(), [this] { return progress_note(); });
       interrupted = interrupt_.requested();
@@ -117,6 +121,7 @@ class Run {
     bool interrupted = false;
     while (auto measurement = input.next()) {
       require_legs(*measurement);
+      skeleton_.add(*measurement);
       interrupted = !pace.wait_for(input.arrived(), interrupt_);
       if (interrupted || runner.failed()) break;
       runner.push(*std::move(measurement));
@@ -192,6 +197,7 @@ class Run {
   Estimator estimator_;
   MapKeeper map_;
   ResultFiles files_;
+  SkeletonFile skeleton_;
   Progress progress_;
   bool legs_seen_ = false;
   int foreign_legs_ = 0;

@@ -9,6 +9,7 @@
 
 #include "apps/cli/exit_code.hpp"
 #include "lab/messages/input_error.hpp"
+#include "lab/messages/message_decoder.hpp"
 #include "lab/recordings/recording_file.hpp"
 #include "lab/settings/nearest.hpp"
 
@@ -50,6 +51,28 @@ std::set<std::string> topics_of(const std::string& input) {
   std::set<std::string> out;
   const lab::Rosbag1Reader reader = lab::open_recording(input);
   for (const auto& [id, connection] : reader.connections()) out.insert(connection.topic);
+  return out;
+}
+
+// A topic of the sensor's kind that no setting names: then the setting is misspelt, and the sensor is not simply absent.
+std::optional<std::string> unnamed_topic(Sensor sensor, const lab::Settings& settings, const std::string& input) {
+  const lab::Rosbag1Reader reader = lab::open_recording(input);
+  for (const auto& [id, connection] : reader.connections()) {
+    if (lab::sensor_of_type(connection.type) != sensor) continue;
+    const bool named = std::ranges::any_of(every_sensor, [&](Sensor other) {
+      return settings.has(other) && lab::topic_matches(other, settings.topic(other), connection.topic);
+    });
+    if (!named) return connection.topic;
+  }
+  return std::nullopt;
+}
+
+std::string names_of(const std::vector<Sensor>& sensors) {
+  std::string out;
+  for (const Sensor sensor : sensors) {
+    if (!out.empty()) out += ',';
+    out += name_of(sensor);
+  }
   return out;
 }
 
@@ -118,6 +141,7 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
   const auto measures_motion = [](Sensor sensor) { return sensor == Sensor::legs || sensor == Sensor::lidar; };
   bool any_present = false, more_configured = false;
   std::vector<std::string> missing;
+  std::vector<Sensor> absent;
   for (const Sensor sensor : every_sensor) {
     if (!settings.has(sensor)) continue;
     const std::string& pattern = settings.topic(sensor);
@@ -130,6 +154,7 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
       const std::vector<std::string> names(topics.begin(), topics.end());
       missing.push_back(fmt::format("no topic {} ({}), nearest is {}", pattern, name_of(sensor), lab::nearest(pattern, names)));
       out.warnings.push_back(missing.back());
+      absent.push_back(sensor);
     }
   }
   if (!any_present) {
@@ -138,6 +163,12 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
   }
   if (out.used.empty() || out.used.front() != Sensor::imu) {
     throw lab::InputError(fmt::format("{}: {}", input, missing.empty() ? "no IMU is configured" : missing.front()));
+  }
+  for (std::size_t i = 0; i < absent.size(); ++i) {
+    if (const auto topic = unnamed_topic(absent[i], settings, input)) {
+      throw lab::InputError(fmt::format("{}: {}; {} is of that kind: --set {}.topic={}, or leave the sensor out with --sensors {}", input,
+                                        missing[i], *topic, name_of(absent[i]), *topic, names_of(out.used)));
+    }
   }
   if (more_configured && std::ranges::none_of(out.used, measures_motion)) {
     std::string why;

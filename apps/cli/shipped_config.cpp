@@ -11,7 +11,9 @@ namespace fs = std::filesystem;
 fs::path config_file(const std::optional<std::string>& wanted, const std::string& input) {
   if (wanted) return *wanted;
   std::error_code error;
-  if (fs::path own = fs::path(input) / "config.yaml"; !input.empty() && fs::is_regular_file(own, error)) return own;
+  // A folder of `kilvo simulate`, or the recording in it.
+  const fs::path simulated = fs::path(input).filename() == "recording.bag" ? fs::path(input).parent_path() : fs::path(input);
+  if (fs::path own = simulated / "config.yaml"; !input.empty() && fs::is_regular_file(own, error)) return own;
   // Beside the program as installed; the path of the sources only helps a program that was built and never installed.
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   const fs::path installed = program.parent_path().parent_path() / "share/kilvo/config";

@@ -4,6 +4,9 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <string>
+
+#include "lab/evaluation/align.hpp"
 
 namespace kilvo::cli {
 
@@ -13,10 +16,14 @@ using Action = std::function<int()>;
 void add_run(CLI::App& program, Action& chosen);
 void add_info(CLI::App& program, Action& chosen);
 void add_eval(CLI::App& program, Action& chosen);
+void add_compare(CLI::App& program, Action& chosen);
 void add_eval_contacts(CLI::App& program, Action& chosen);
 void add_report(CLI::App& program, Action& chosen);
 void add_config(CLI::App& program, Action& chosen);
 void add_demo(CLI::App& program, Action& chosen);
 void add_simulate(CLI::App& program, Action& chosen);
+
+/// The alignment of that name. Throws UsageError that names the nearest.
+lab::Alignment alignment_or_refuse(const std::string& name);
 
 }  // namespace kilvo::cli

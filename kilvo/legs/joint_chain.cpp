@@ -134,6 +134,16 @@ std::optional<std::string> JointChain::look_up(const std::vector<std::string>& m
   return std::nullopt;
 }
 
+std::vector<Eigen::Vector3d> JointChain::places_of_joints(const std::vector<double>& position) const {
+  std::vector<Eigen::Vector3d> out;
+  MovingFrame frame;
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    pass(joints[i], i < places.size() ? position[places[i]] : 0, 0, frame);
+    out.push_back(frame.p);
+  }
+  return out;
+}
+
 MovingFrame JointChain::end(const std::vector<double>& position, const std::vector<double>& velocity) const {
   MovingFrame frame;
   for (std::size_t i = 0; i < places.size(); ++i) pass(joints[i], position[places[i]], velocity[places[i]], frame);

@@ -33,6 +33,8 @@ struct JointChain {
   std::optional<std::string> look_up(const std::vector<std::string>& message_names);
   /// The last link. Both arrays are those of a message whose names have been looked up.
   MovingFrame end(const std::vector<double>& position, const std::vector<double>& velocity) const;
+  /// Where the joints are, and the origin of the last link, m; of a message whose names have been looked up.
+  std::vector<Eigen::Vector3d> places_of_joints(const std::vector<double>& position) const;
 };
 
 /// The links and joints of a URDF; robot.locked_joints do not move.

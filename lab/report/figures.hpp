@@ -46,8 +46,12 @@ Figures contact_figures(const TimeBase& time, const std::vector<ContactRow>& con
 Figures modality_figures(const TimeBase& time, const RunFiles& run);
 Figures rate_figures(const TimeBase& time, const RunFiles& run);
 Figures stage_figures(const TimeBase& time, const std::vector<StageRow>& timing);
-Figures map_figures(const TimeBase& time, const Cloud& map, const Way& way);
+Figures map_figures(const TimeBase& time, const RunFiles& run, const Way& way);
 Figures summary_figures(const Json& summary);
+
+/// The robot at up to 1500 times, for playback: {t: [s], joints: points of one leg, p: [[x, y, z, ... of the left leg, then the right, in
+/// the world, cm]], on: [bit 0 left, bit 1 right]}; null when it is not known.
+Json playback_of(const TimeBase& time, const RunFiles& run);
 
 /// The numbers on top: {label, value, unit, note, bad}.
 Json headlines(const RunFiles& run, const Way& way, const std::optional<ContactEvaluation>& contacts);

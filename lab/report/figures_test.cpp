@@ -165,7 +165,9 @@ TEST(Figures, APointIsWhereItWasTo16Bits) {
   Cloud cloud;
   cloud.points_W = {{-1, -2, -3}, {1, 2, 3}, {0, 0, 0}};
   cloud.rgb = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
-  const Figures figures = map_figures(time_base, cloud, {});
+  RunFiles run;
+  run.map = cloud;
+  const Figures figures = map_figures(time_base, run, {});
   ASSERT_THAT(figures, SizeIs(1));
   EXPECT_EQ(figures[0]["n"], 3);
   EXPECT_EQ(figures[0]["low"], Json({-1.0, -2.0, -3.0}));
@@ -184,8 +186,26 @@ TEST(Figures, WithoutDataThereAreNone) {
   EXPECT_THAT(modality_figures(time_base, nothing), IsEmpty());
   EXPECT_THAT(rate_figures(time_base, nothing), IsEmpty());
   EXPECT_THAT(stage_figures(time_base, {}), IsEmpty());
-  EXPECT_THAT(map_figures(time_base, {}, way), IsEmpty());
+  EXPECT_THAT(map_figures(time_base, RunFiles{}, way), IsEmpty());
   EXPECT_THAT(summary_figures(Json::object()), IsEmpty());
+}
+
+TEST(Playback, PutsTheLegsWhereTheRobotIs) {
+  RunFiles run;
+  const Time begin = time_base.zero;
+  for (int i = 0; i < 3; ++i) {
+    const Time t = begin + std::chrono::seconds(i);
+    run.odometry.push_back({t, {SO3::Exp({0, 0, 0.5 * M_PI * i}), {1.0 * i, 0, 0}}});
+    const std::vector<Eigen::Vector3d> leg{{0, 0, 0}, {1, 0, -1}};
+    run.skeleton.push_back({t, {leg, leg}});
+    run.contacts.push_back({{t, {i != 1, true}}, {}});
+  }
+  const Json robot = playback_of(time_base, run);
+  EXPECT_EQ(robot["joints"], 2);
+  EXPECT_EQ(robot["t"], Json({0.0, 1.0, 2.0}));
+  EXPECT_EQ(robot["p"][1], Json({100, 0, 0, 100, 100, -100, 100, 0, 0, 100, 100, -100}));  // a quarter turn about z, 1 m along x
+  EXPECT_EQ(robot["on"], Json({3, 2, 3}));
+  EXPECT_TRUE(playback_of(time_base, RunFiles{}).is_null());
 }
 
 }  // namespace

@@ -72,7 +72,8 @@ Json triple(const Eigen::Vector3f& v) { return {v.x(), v.y(), v.z()}; }
 
 }  // namespace
 
-Figures map_figures(const TimeBase& time, const Cloud& map, const Way& way) {
+Figures map_figures(const TimeBase& time, const RunFiles& run, const Way& way) {
+  const Cloud& map = run.map;
   const std::vector<std::size_t> kept = thin_points(map.points_W, most_points);
   if (kept.empty()) return {};
   Box box;
@@ -83,7 +84,9 @@ Figures map_figures(const TimeBase& time, const Cloud& map, const Way& way) {
   std::string note = std::to_string(kept.size());
   if (kept.size() < map.points_W.size()) note += " of " + std::to_string(map.points_W.size());
   Json out = figure("cloud", "map", "way", "Map",
-                    note + " points. Drag to turn, two fingers or the right button to move, pinch or wheel to come closer.");
+                    note +
+                        " points. Drag to turn, two fingers or the right button to move, pinch or wheel to come closer. Play moves the "
+                        "robot along the time axis.");
   out["n"] = kept.size();
   out["low"] = triple(box.low);
   out["high"] = triple(box.high);
@@ -94,6 +97,7 @@ Figures map_figures(const TimeBase& time, const Cloud& map, const Way& way) {
   const auto [estimate, truth] = curves_of(time, way);
   if (!truth.empty()) out["lines"].push_back(path_line("truth", "truth", truth));
   if (!estimate.empty()) out["lines"].push_back(path_line("estimate", "estimate", estimate));
+  out["robot"] = playback_of(time, run);
   return {out};
 }
 

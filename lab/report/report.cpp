@@ -57,6 +57,19 @@ Json warnings_of(const Json& summary) {
   return out;
 }
 
+/// Why the run must not be trusted; empty: nothing is known against it.
+Json reasons_for_distrust(const RunFiles& run, const Way& way) {
+  Json out = Json::array();
+  const auto is_true = [&](const char* key) { return run.summary.contains(key) && run.summary[key] == true; };
+  if (run.summary.contains("failure") && run.summary["failure"].is_string()) out.push_back(run.summary["failure"].get<std::string>());
+  if (is_true("diverged")) out.push_back("the estimate diverged");
+  if (way.evaluation && judge_divergence(*way.evaluation).diverged)
+    out.push_back("the error against the truth is larger than a drift could be");
+  if (run.summary.contains("recovery") && run.summary["recovery"].is_object() && run.summary["recovery"].value("maps_begun_anew", 0) > 0)
+    out.push_back("the map was begun anew: poses before and after do not belong together");
+  return out;
+}
+
 }  // namespace
 
 Report make_report(const ReportOptions& options) {
@@ -79,12 +92,13 @@ Report make_report(const ReportOptions& options) {
   page["version"] = run.summary.contains("version") && run.summary["version"].is_string() ? run.summary["version"].get<std::string>() : "";
   page["input"] = run.summary.contains("input") && run.summary["input"].is_string() ? run.summary["input"].get<std::string>() : "";
   page["headlines"] = headlines(run, way, contacts);
+  page["distrust"] = reasons_for_distrust(run, way);
   page["warnings"] = warnings_of(run.summary);
   page["missing"] = run.missing;
   page["has_truth"] = options.truth.has_value();
   page["of_sweeps"] = way.of_sweeps;
   page["figures"] = Json::array();
-  for (Figures& group : std::vector<Figures>{map_figures(time, run.map, way), path_figures(time, way), error_figures(time, way, run.states),
+  for (Figures& group : std::vector<Figures>{map_figures(time, run, way), path_figures(time, way), error_figures(time, way, run.states),
                                              state_figures(time, run.states, truth, way),
                                              contact_figures(time, run.contacts, true_contacts, contacts), modality_figures(time, run),
                                              rate_figures(time, run), stage_figures(time, run.timing), summary_figures(run.summary)}) {

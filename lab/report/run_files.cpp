@@ -82,6 +82,28 @@ std::vector<StageRow> read_timing(const fs::path& path) {
   return rows;
 }
 
+std::vector<SkeletonRow> read_skeleton(const fs::path& path) {
+  CsvReader csv(path);
+  const std::size_t t = csv.column("t");
+  std::array<std::vector<std::array<std::size_t, 3>>, 2> at;
+  for (const std::size_t side : {0U, 1U}) {
+    for (std::size_t i = 0;; ++i) {
+      const std::string prefix = (side == 0 ? "left_" : "right_") + std::to_string(i) + "_";
+      if (!csv.find_column(prefix + "x")) break;
+      at[side].push_back(columns(csv, prefix));
+    }
+  }
+  std::vector<SkeletonRow> rows;
+  for_each_row(csv, [&](const CsvReader& row) {
+    rows.push_back({row.time(t), {}});
+    for (const std::size_t side : {0U, 1U}) {
+      for (const auto& place : at[side]) rows.back().legs[side].push_back(vector(row, place));
+    }
+    return rows.back().t;
+  });
+  return rows;
+}
+
 Cloud read_map(const fs::path& path) {
   try {
     return read_cloud(path);
@@ -122,6 +144,7 @@ RunFiles read_run_files(const fs::path& folder) {
   read("contacts.csv", run.contacts, read_contact_rows);
   read("modality.csv", run.modality, read_modality);
   read("timing.csv", run.timing, read_timing);
+  if (fs::exists(folder / "skeleton.csv", error)) run.skeleton = read_skeleton(folder / "skeleton.csv");
   read("map.ply", run.map, read_map);
   read("summary.json", run.summary, read_summary);
   return run;

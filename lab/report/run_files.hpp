@@ -40,6 +40,12 @@ struct StageRow {
   double microseconds = 0;
 };
 
+/// A row of skeleton.csv: the joints of each leg from the IMU's link to the foot, in the IMU frame, m.
+struct SkeletonRow {
+  Time t{};
+  std::array<std::vector<Eigen::Vector3d>, 2> legs;
+};
+
 struct RunFiles {
   std::string name;                           // of the folder
   std::vector<StampedPose> odometry, sweeps;  // T_WI
@@ -47,6 +53,7 @@ struct RunFiles {
   std::vector<ContactRow> contacts;
   std::vector<ModalityRow> modality;
   std::vector<StageRow> timing;
+  std::vector<SkeletonRow> skeleton;  // empty without legs
   Cloud map;
   nlohmann::ordered_json summary;    // an object, empty when the file is not there
   std::vector<std::string> missing;  // names of files

@@ -160,6 +160,15 @@ TEST(Simulate, AWalkIsWrittenReadByOthersAndRunOn) {
   walk.expect_that_kilvo_runs_on_it();
 }
 
+TEST(Simulate, TheRecordingInTheFolderUsesTheConfigurationBesideIt) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(kilvo({"simulate", "room", "--out", folder / "sim", "--duration", "1"}).code, 0);
+  const Finished info = kilvo({"info", folder / "sim/recording.bag"});
+  EXPECT_EQ(info.code, 0) << info.err;
+  EXPECT_THAT(info.out,
+              AllOf(HasSubstr("use: with " + (folder / "sim/config.yaml")), HasSubstr("joints: 15 of the 15 between torso_link")));
+}
+
 TEST(Simulate, TheSameSeedGivesTheSameBytes) {
   const TemporaryFolder folder;
   for (const char* name : {"a", "b"}) ASSERT_EQ(kilvo({"simulate", "stairs", "--out", folder / name, "--duration", "0.3"}).code, 0);

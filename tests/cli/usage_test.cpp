@@ -65,7 +65,7 @@ TEST(Usage, HelpAndVersionGoToStdout) {
   EXPECT_EQ(version.out, "kilvo 0.1.0\n");
   const Finished help = kilvo({"--help"});
   EXPECT_EQ(help.code, 0);
-  for (const char* verb : {"run", "info", "eval", "eval-contacts", "report", "config", "demo"}) {
+  for (const char* verb : {"run", "info", "eval", "compare", "eval-contacts", "report", "config", "demo"}) {
     EXPECT_THAT(help.out, HasSubstr(verb));
     const Finished its_help = kilvo({verb, "--help"});
     EXPECT_EQ(its_help.code, 0) << verb;
@@ -102,6 +102,29 @@ TEST_F(Verbs, EvalRefusesFilesItCannotCompare) {
   expect_error({"eval", folder / "missing.tum", folder / "gt.tum"}, 3, "missing.tum");
   expect_error({"eval", folder / "bad.tum", folder / "gt.tum"}, 3, "bad.tum:2");
   expect_error({"eval", folder / "later.tum", folder / "gt.tum"}, 3, "");
+}
+
+TEST_F(Verbs, EvalOfARunWithoutSweepsPointsToTheOdometry) {
+  lab::write_tum(folder / "gt.tum", small_walk(1).truth);
+  lab::write_tum(folder / "odometry.tum", small_walk(1).truth);
+  lab::write_tum(folder / "sweeps.tum", {});
+  expect_error({"eval", folder / "sweeps.tum", folder / "gt.tum"}, 3, "evaluate " + (folder / "odometry.tum") + " instead");
+}
+
+TEST_F(Verbs, CompareTellsRunsApart) {
+  std::vector<lab::StampedPose> off = small_walk(3).truth;
+  lab::write_tum(folder / "gt.tum", off);
+  for (std::size_t i = 0; i < off.size(); ++i) off[i].T.p.z() += i % 2 == 0 ? 0.01 : -0.01;
+  lab::write_tum(folder / "off.tum", off);
+  const Finished f =
+      kilvo({"compare", folder / "gt.tum", folder / "off.tum", "--gt", folder / "gt.tum", "--json", "--out", folder / "page.html"});
+  ASSERT_EQ(f.code, 0) << f.err;
+  const auto json = nlohmann::json::parse(f.out);
+  EXPECT_EQ(json["align"], "se3");
+  EXPECT_LT(json["runs"][0]["ate_rmse_m"], 1e-8);
+  EXPECT_NEAR(json["runs"][1]["axis_rmse_m"][2], 0.01, 1e-4);
+  EXPECT_THAT(read_text(folder / "page.html"), HasSubstr("off.tum"));
+  expect_error({"compare", folder / "gt.tum", "--gt", folder / "missing.tum"}, 3, "missing.tum");
 }
 
 TEST_F(Verbs, InfoNamesWhatItFinds) {

@@ -21,6 +21,7 @@ function drawHead(data) {
                  data.has_truth ? `compared with the truth at each ${data.of_sweeps ? 'sweep' : 'output'}` : 'no truth was given, so there are no errors to show'];
   document.getElementById('about').textContent = parts.filter(Boolean).join(' · ');
   const main = document.getElementById('main');
+  if (data.distrust.length) main.append(el('p', {class: 'distrust', role: 'alert'}, el('b', {}, 'Do not trust this run: '), data.distrust.join('; ')));
   if (data.headlines.length) {
     main.append(el('div', {class: 'headlines'}, ...data.headlines.map((h) => el('div', {class: h.bad ? 'headline bad' : 'headline'},
         el('div', {class: 'label'}, h.label), el('div', {class: 'value'}, h.value, el('span', {class: 'unit'}, h.unit)), el('div', {class: 'note'}, h.note)))));

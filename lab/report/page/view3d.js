@@ -109,7 +109,8 @@ class PointView {
     const seen = this.splat(pixels, depths, w, h);
     this.context.putImageData(image, 0, 0);
     for (const line of this.figure.lines) this.stroke(line, ratio);
-    if (this.cursor !== null && this.walked) this.dot(ratio);
+    if (this.cursor !== null && this.figure.robot) this.robot(ratio);
+    else if (this.cursor !== null && this.walked) this.dot(ratio);
     return seen;
   }
 
@@ -148,6 +149,31 @@ class PointView {
     context.lineWidth = (line.role === 'truth' ? 3.5 : 2) * ratio;
     context.strokeStyle = line.role === 'truth' ? '#ffffffa0' : '#ff4d5e';
     context.stroke();
+  }
+
+  /** Both legs at the cursor's time, the feet coloured while they stand. */
+  robot(ratio) {
+    const {t, joints, p, on} = this.figure.robot, frame = nearestIndex(t, this.cursor), to = this.project(), context = this.context;
+    context.lineWidth = 3.5 * ratio;
+    context.lineCap = context.lineJoin = 'round';
+    for (const side of [0, 1]) {
+      context.beginPath();
+      let foot = null;
+      for (let i = 0; i < joints; ++i) {
+        const [x, y, depth] = to(...p[frame].slice(3 * (side * joints + i), 3 * (side * joints + i) + 3).map((cm) => cm / 100));
+        if (depth < 0.2) continue;
+        if (foot) context.lineTo(x, y); else context.moveTo(x, y);
+        foot = [x, y];
+      }
+      context.strokeStyle = '#ffffff';
+      context.stroke();
+      if (!foot) continue;
+      context.beginPath();
+      context.arc(foot[0], foot[1], 6.5 * ratio, 0, 2 * Math.PI);
+      context.fillStyle = on[frame] >> side & 1 ? '#37d67a' : '#ff9d4d';
+      context.fill();
+    }
+    this.shown = frame;
   }
 
   dot(ratio) {
@@ -202,6 +228,38 @@ function steer(view) {
   }, {passive: false});
 }
 
+/** Moves the cursor of time along, as fast as the robot was times the chosen speed. */
+function playback(view) {
+  const t = view.figure.robot ? view.figure.robot.t : view.walked.t, end = t[t.length - 1];
+  const button = el('button', {type: 'button', class: 'play'}, 'Play'), place = el('input', {type: 'range', min: 0, max: 1000, value: 0, class: 'place', 'aria-label': 'time'});
+  const speed = el('select', {'aria-label': 'speed'}, ...['1', '2', '5', '10'].map((x) => el('option', {value: x}, `${x} x`))), reading = el('span', {class: 'reading'});
+  let last = null, now = t[0];
+  const show = (time) => {
+    now = Math.min(end, Math.max(t[0], time));
+    place.value = Math.round(1000 * (now - t[0]) / Math.max(1e-9, end - t[0]));
+    reading.textContent = `${now.toFixed(1)} s`;
+    timeView.setCursor(now);
+  };
+  const step = (stamp) => {
+    if (last === null) return;
+    const seconds = Math.min(0.2, Math.max(0, (stamp - last) / 1000));
+    last = stamp;
+    show(now + seconds * Number(speed.value));
+    if (now >= end) stop(); else requestAnimationFrame(step);
+  };
+  const stop = () => { last = null; button.textContent = 'Play'; };
+  button.addEventListener('click', () => {
+    if (last !== null) return stop();
+    if (now >= end) now = t[0];
+    last = performance.now();
+    button.textContent = 'Pause';
+    requestAnimationFrame(step);
+  });
+  place.addEventListener('input', () => { stop(); show(t[0] + Number(place.value) / 1000 * (end - t[0])); });
+  reading.textContent = `${t[0].toFixed(1)} s`;
+  return el('div', {class: 'tools'}, button, place, reading, el('label', {}, 'speed', speed));
+}
+
 /** kind `cloud`: returns how many points are in sight at first. */
 function drawCloud(figure, parent) {
   const canvas = el('canvas', {role: 'img', 'aria-label': 'map of points'});
@@ -212,6 +270,7 @@ function drawCloud(figure, parent) {
   parent.append(el('div', {class: 'view'}, canvas),
                 el('div', {class: 'tools'}, el('label', {}, 'coloured by', choice), el('label', {}, 'cut off above', slider, reading), again));
   const view = new PointView(figure, canvas);
+  if (view.walked && view.walked.t.length > 1) parent.append(playback(view));
   const cutAt = () => {
     const share = Number(slider.value) / 1000;
     view.cut = share >= 1 ? Infinity : figure.low[2] + share * (figure.high[2] - figure.low[2]);
