@@ -77,5 +77,15 @@ fuzz: dependencies-dev
 install: build
 	cmake --install $(BUILD) --prefix $(PREFIX)
 
+# In a folder of its own: what is packed needs neither tests nor benchmarks.
+package:
+	@scripts/install_dependencies --package
+	@cmake --preset release -B build/package -D BUILD_TESTING=OFF -D KILVO_BUILD_BENCHMARKS=OFF -D CMAKE_INSTALL_PREFIX=/usr --log-level=WARNING
+	@cmake --build build/package --target programs
+	@scripts/make_manual --kilvo build/package/bin/kilvo --out build/package/manual
+	@gzip -9nf build/package/manual/kilvo.1
+	@cd build/package && cpack -G DEB
+	@ls -l build/package/*.deb
+
 clean:
 	rm -rf build
