@@ -58,7 +58,7 @@ std::set<std::string> topics_of(const std::string& input) {
 std::optional<std::string> unnamed_topic(Sensor sensor, const lab::Settings& settings, const std::string& input) {
   const lab::Rosbag1Reader reader = lab::open_recording(input);
   for (const auto& [id, connection] : reader.connections()) {
-    if (lab::sensor_of_type(connection.type) != sensor) continue;
+    if (!lab::is_type_of(sensor, connection.type)) continue;
     const bool named = std::ranges::any_of(every_sensor, [&](Sensor other) {
       return settings.has(other) && lab::topic_matches(other, settings.topic(other), connection.topic);
     });
