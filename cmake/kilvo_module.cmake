@@ -2,7 +2,7 @@
 #
 # One folder is one module is one CMake target, `kilvo_NAME` (alias `kilvo::NAME`): every *.cpp is compiled,
 # every *_test.cpp beside it goes into one test program `kilvo_NAME_test`. Every *.hpp compiles alone (scripts/check_headers).
-# What a module may include is said in modules.txt and checked by scripts/check_modules.
+# What a module may include is listed in modules.txt and checked by scripts/check_modules.
 
 add_library(kilvo_flags INTERFACE)
 target_compile_options(kilvo_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -fno-math-errno -fno-trapping-math

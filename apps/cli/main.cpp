@@ -1,4 +1,4 @@
-// kilvo: the door for a person at a command line.
+// kilvo: the command line program.
 #include <algorithm>
 #include <fmt/core.h>
 #include <new>

@@ -67,7 +67,7 @@ void LiveRunner::take_over() {
   Fork& fork = forks_.front();
   fast_raw_.catch_up(fork.runner);
   if (fork.corrected) statistics_.correction.add(seconds_since(*fork.corrected));
-  // That there is no pose any more is said once.
+  // That there is no pose any more is reported once.
   if (fork.runner.imu_lost() && !std::exchange(lost_, true)) emit(Clock::now());
   lost_ = fork.runner.imu_lost();
 }

@@ -7,7 +7,7 @@ namespace kilvo::live {
 
 struct ThreadSettings {
   const char* name = "";  // at most 15 characters
-  int priority = 0;       // SCHED_FIFO, 1 to 99; 0: as all others; -1: 1, and nothing is said if that cannot be had
+  int priority = 0;       // SCHED_FIFO, 1 to 99; 0: as all others; -1: 1, and nothing is reported if that cannot be had
   int core = -1;          // the only one to run on; -1: any
 };
 

@@ -98,7 +98,7 @@ void Node::tick() {
   const Condition now = condition();
   DiagnosticsMessage message;
   const std::vector<DiagnosticStatus> all = statuses(now);
-  // What changes is said at once.
+  // What changes is reported at once.
   const std::string essence_now = essence(all);
   if (essence_now == last_essence_ && now.now - last_diagnostics_ < diagnostics_period) return;
   if (essence_now != last_essence_) ROS_INFO_STREAM("kilvo: " << all.front().message.c_str());

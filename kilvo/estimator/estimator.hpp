@@ -1,4 +1,4 @@
-// The conductor: measurements in, states out. Values only: it never throws after construction, never prints, never asks the time.
+// The estimator: measurements in, states out. Values only: it never throws after construction, never prints, never asks the time.
 #pragma once
 
 #include <array>
@@ -114,7 +114,7 @@ class Estimator {
   void bridge(Time silent_since, std::vector<Output>& out);
   void lose_legs(Time t);
   bool legs_may_return(Time t);
-  void zero_velocity_update(const ImuSample& s);  // without any other sense, a robot that stands has no velocity
+  void zero_velocity_update(const ImuSample& s);  // without any other sensor, a robot that stands has no velocity
   bool register_sweep(const Estimate& prior, LidarModel& model, const std::vector<PointCluster>& clusters,
                       const UndistortionNoise& within_scan);
   bool may_learn(const Estimate& prior, const RegistrationReport& report);

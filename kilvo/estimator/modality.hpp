@@ -1,4 +1,4 @@
-// Which senses run (paper, Fig. 2).
+// Which sensors carry the estimate (paper, Fig. 2).
 #pragma once
 
 #include <cstdint>

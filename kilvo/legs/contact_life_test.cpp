@@ -53,7 +53,7 @@ TEST(ContactEstimator, ARunThatBecomesASlowWalkIsFollowed) {
   test::expect_changes(slow, walked, 6.5, 9.5, 0.015, 0.015);
 }
 
-// Begun in mid-walk, the velocity wrong by more than that of the walk: whatever the phase, only feet that stand are said to.
+// Begun in mid-walk, the velocity wrong by more than that of the walk: whatever the phase, only feet that stand are reported as standing.
 TEST(ContactEstimator, OnAnUnknownVelocityTheFootThatStandsIsFoundByWhatDoesNotChange) {
   const Gait gait;
   const Eigen::Vector3d wrong(-0.8, 0.2, 0.1);

@@ -1,4 +1,4 @@
-// Settings of the LiDAR sense.
+// Settings of the LiDAR measurement.
 #pragma once
 
 #include <tuple>

@@ -53,7 +53,7 @@ std::optional<Eigen::Vector3d> MountCheck::misalignment() const {
   const double offset = N_(3, 3) + 1 / (likely_offset * likely_offset);
   const Eigen::Matrix3d N = N_.topLeftCorner<3, 3>() - with_offset * with_offset.transpose() / offset;
   const Eigen::Vector3d b = n_.head<3>() - with_offset * n_[3] / offset;
-  // Along what was never turned about nothing is known, and nothing is said.
+  // Along what was never turned about nothing is known, and nothing is reported.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eig(N);
   Eigen::Vector3d psi = Eigen::Vector3d::Zero();
   for (int k = 0; k < 3; ++k) {

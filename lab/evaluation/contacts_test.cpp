@@ -72,7 +72,7 @@ TEST(Contacts, TheTruthItselfIsPerfect) {
 }
 
 // Left touches down 20 ms early and 38 ms late and lifts off 10 ms late at 2000: of its 1900 samples 20 + 38 + 10 = 68 are wrong; of its
-// 800 samples in the air 20 + 10 = 30 are said to be in contact. Right is perfect.
+// 800 samples in the air 20 + 10 = 30 are reported in contact. Right is perfect.
 TEST(Contacts, EarlyAndLateTransitionsCostWhatTheyLast) {
   const ContactEvaluation e = evaluate_contacts(sampled({{1000, 1380}, {2010, 2438}}, right_truth, 4000), truth());
   const FootEvaluation& left = e.feet[left_foot];

@@ -75,7 +75,7 @@ Json headlines(const RunFiles& run, const Way& way, const std::optional<ContactE
   }
   if (const auto memory = number(run.summary, "peak_memory_mb"))
     add(cards, {"Memory", fmt::format("{:.0f}", *memory), "MB", "at most", false});
-  if (is_true(run.summary, "diverged")) add(cards, {"Run", "diverged", "", "by its own word", true});
+  if (is_true(run.summary, "diverged")) add(cards, {"Run", "diverged", "", "judged by the estimator itself", true});
   if (is_true(run.summary, "input_damaged")) add(cards, {"Recording", "damaged", "", "run as far as it is good", true});
   return cards;
 }

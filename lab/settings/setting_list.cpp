@@ -48,6 +48,17 @@ void forget_defaults_of_intrinsics(std::vector<Setting>& list) {
   }
 }
 
+// What users change; all others that have a default are advanced.
+constexpr std::string_view common[] = {"imu.rate",        "imu.gyro_noise",   "imu.accel_noise",   "legs.type",
+                                       "legs.rate",       "legs.time_offset", "lidar.rate",        "lidar.time_offset",
+                                       "lidar.min_range", "lidar.max_range",  "lidar.range_noise", "lidar.voxel_size",
+                                       "camera.rate",     "camera.model",     "camera.distortion", "camera.time_offset",
+                                       "map.radius",      "map.resolution",   "estimator.threads", "estimator.smooth_time"};
+
+void mark_common(std::vector<Setting>& list) {
+  for (Setting& s : list) s.advanced = s.has_default && std::find(std::begin(common), std::end(common), s.key) == std::end(common);
+}
+
 }  // namespace
 
 std::vector<Setting> list_settings(Settings& s) {
@@ -101,6 +112,7 @@ std::vector<Setting> list_settings(Settings& s) {
   list.fields("estimator.update", s.estimator.update);
   list.fields("live", s.live);
   forget_defaults_of_intrinsics(out);
+  mark_common(out);
   return out;
 }
 

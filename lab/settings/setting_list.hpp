@@ -23,6 +23,7 @@ struct Setting {
   std::string_view unit;     // "-" when it has none
   std::string_view meaning;  // one sentence
   bool has_default = true;   // false: differs from robot to robot, so nothing is assumed
+  bool advanced = true;      // rarely needed: for who knows the method
   std::string_view name() const { return std::string_view(key).substr(key.rfind('.') + 1); }
 };
 

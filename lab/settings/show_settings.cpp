@@ -68,8 +68,9 @@ constexpr const char* markdown_head = R"(# Settings
 
 Made by `kilvo config show --markdown > docs/parameters.md` from the structs that hold the settings; a test keeps it up to date.
 
-A configuration file is YAML, one map per section below; a dot in a name is one level deeper (`lidar.T_imu_lidar.p`). What has no default
-describes the robot and must be in the file when the sensor it belongs to is used; the rest is tuning and rarely needed. One setting is
+A configuration file is YAML, one map per section; a dot in a name is one level deeper (`lidar.T_imu_lidar.p`). What has no default
+describes the robot and must be in the file when the sensor it belongs to is used; the rest is tuning and rarely needed. A rotation `R` may
+also be written as `q: [x, y, z, w]` or as `rpy: [roll, pitch, yaw]` (rad, about fixed axes). One setting is
 changed on the command line by `--set lidar.voxel_size=0.2`, where the value is YAML too. `kilvo config show FILE` prints all settings as
 they would be used, `kilvo config check FILE` finds mistakes: an unknown name, a wrong type, a number out of range, a rotation that is
 not one (`R^T R` must be the identity within 0.001), a link or joint that the URDF does not have are errors that name file, line, setting
@@ -124,22 +125,39 @@ std::string settings_json(const Settings& settings) {
   return out + "}";
 }
 
+namespace {
+
+std::string markdown_row(const Setting& s) {
+  std::string values = range_text(s);
+  values = values.empty() ? type_text(s.value) : choices_of(s.key).empty() ? fmt::format("{}, {}", type_text(s.value), values) : values;
+  return fmt::format("| `{}` | {} | {} | {} | {} |\n", s.key, s.has_default ? fmt::format("`{}`", value_text(s.value)) : "", s.unit, values,
+                     s.meaning);
+}
+
+constexpr const char* markdown_columns = "| setting | default | unit | values | meaning |\n|---|---|---|---|---|\n";
+
+}  // namespace
+
 std::string settings_markdown() {
   Settings defaults;
   const std::vector<Setting> list = list_settings(defaults);
-  std::string section, out = markdown_head;
+  std::string robot, common, advanced, section;
   for (const Setting& s : list) {
-    const std::string its_section = s.key.substr(0, s.key.find('.'));
-    if (its_section != section) {
+    if (!s.has_default) {
+      robot += markdown_row(s);
+    } else if (!s.advanced) {
+      common += markdown_row(s);
+    } else {
+      const std::string its_section = s.key.substr(0, s.key.find('.'));
+      if (its_section != section) advanced += fmt::format("\n### {}\n{}", its_section, markdown_columns);
       section = its_section;
-      out += fmt::format("\n## {}\n| setting | default | unit | values | meaning |\n|---|---|---|---|---|\n", section);
+      advanced += markdown_row(s);
     }
-    std::string values = range_text(s);
-    values = values.empty() ? type_text(s.value) : choices_of(s.key).empty() ? fmt::format("{}, {}", type_text(s.value), values) : values;
-    out += fmt::format("| `{}` | {} | {} | {} | {} |\n", s.key, s.has_default ? fmt::format("`{}`", value_text(s.value)) : "", s.unit,
-                       values, s.meaning);
   }
-  return out;
+  return fmt::format(
+      "{}\n## The robot\nNo defaults: required for the sensors that are used ([your robot](your-robot.md)).\n\n{}{}"
+      "\n## Often changed\n{}{}\n## Advanced\nFor who knows the method: the defaults hold for every robot tested.\n{}",
+      markdown_head, markdown_columns, robot, markdown_columns, common, advanced);
 }
 
 }  // namespace kilvo::lab

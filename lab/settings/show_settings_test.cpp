@@ -69,6 +69,16 @@ TEST(ShowSettings, TheMarkdownHasEverySetting) {
   EXPECT_THAT(text, HasSubstr("| `lidar.voxel_size` | `0.25` | m | number, 0.01 to 25 |"));
 }
 
+TEST(ShowSettings, TwentySettingsAreNotAdvanced) {
+  Settings defaults;
+  int common = 0;
+  for (const Setting& setting : list_settings(defaults)) common += setting.has_default && !setting.advanced ? 1 : 0;
+  EXPECT_EQ(common, 20);
+  const std::string text = settings_markdown();
+  EXPECT_LT(text.find("| `lidar.voxel_size`"), text.find("## Advanced"));
+  EXPECT_GT(text.find("| `lidar.gate`"), text.find("## Advanced"));
+}
+
 TEST(ShowSettings, TheJsonIsNested) {
   const std::string text = settings_json(parse_settings("imu: {topic: /imu}\nestimator: {update: {max_iterations: 4}}", "x", "."));
   EXPECT_THAT(text, HasSubstr("\"update\": {\"max_iterations\": 4, "));

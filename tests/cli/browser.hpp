@@ -10,7 +10,7 @@ namespace kilvo::stories {
 struct OpenedPage {
   int code = -1;
   std::string dom;        // the page after its scripts have run, as HTML
-  std::string console;    // what was said on the console, one line each
+  std::string console;    // what was printed on the console, one line each
   nlohmann::json drawn;   // what the report says it has drawn; null when it says nothing
   nlohmann::json probed;  // what a script of the test has left in an element `probe`
 };

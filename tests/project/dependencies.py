@@ -89,7 +89,7 @@ def check_sources(root: str, listed: list[str]) -> list[str]:
         elif package not in listed and not LANGUAGE.fullmatch(package):
             faults.append(f"{place}: {name} is in {package}, which scripts/install_dependencies does not install")
     faults += [f"scripts/install_dependencies: nothing in the tree includes a header of {package}; leave it out"
-               for package in listed if package.endswith("-dev") and package not in used and not package.startswith("libclang-rt")]
+               for package in listed if package.endswith("-dev") and package not in {*used, "dpkg-dev"} and not package.startswith("libclang-rt")]
     return faults
 
 

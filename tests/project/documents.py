@@ -13,7 +13,7 @@ sys.path.insert(0, os.path.join(ROOT, "scripts"))
 import cpp_text  # noqa: E402  (from scripts/)
 
 NAMING = ("docs/architecture.md", "docs/notation.md")
-# Spoken of as a shape, an example or something that is not there on purpose.
+# Named as a shape, an example or something that is not there on purpose.
 EXAMPLES = {"x.hpp", "x.cpp", "x_test.cpp", "x_fuzz.cpp", "now", "-ffast-math", "p_W", "p_I", "p_A", "p_B", "T_AB", "T_WL", "T_IL", "T_WI"}
 
 

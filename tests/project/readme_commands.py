@@ -1,15 +1,18 @@
-"""Holds README.md to the truth: every command line, option and piece of code in it is run or looked up.
+"""Holds README.md and the pages of docs/ to the truth: every command line, option and piece of code in them is run or looked up.
 
 Fenced blocks, by what follows the three backticks:
-  sh                  each `kilvo ...` line is run in an empty folder and must succeed
+  sh                  each `kilvo ...` line is run and must succeed: those of a page one after the other in one folder, empty at first
   sh needs-recording  it cannot be run here: its verb and each of its options must be in `kilvo VERB --help`
+  yaml FILE           is written into that folder as FILE, for the commands below it; `kilvo config check FILE` must find it good
+  yaml                each key must be one that config/robots/g1.yaml or docs/parameters.md has
   cmake, cpp          each line must stand, in this order, in tests/consumer/CMakeLists.txt or tests/consumer/main.cpp
-  yaml                each key must be one that config/robots/g1.yaml has
   text                nothing is checked
 In both kinds of sh block: `make X` needs a target X (and uses of VAR=... a variable VAR) in the Makefile, a path of the project
-must exist, and any other program must be one of PROGRAMS. A trailing `# ...` is a comment. Links to files must lead somewhere.
+must exist, and any other program must be one of PROGRAMS. A trailing `# ...` is a comment. Links to files must lead somewhere. README.md
+has at most LINES lines.
 """
 import argparse
+import glob
 import os
 import re
 import shlex
@@ -21,6 +24,7 @@ from typing import Iterator, NamedTuple
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 PROGRAMS = ("cd", "git", "cmake", "ctest")
 TIMEOUT_S = 120
+LINES = 150
 
 
 class Block(NamedTuple):
@@ -48,14 +52,16 @@ def commands(block: Block) -> Iterator[tuple[int, list[str]]]:
             text = ""
 
 
-class Readme:
-    def __init__(self, root: str, kilvo: str | None):
+class Page:
+    def __init__(self, root: str, kilvo: str | None, path: str = "README.md"):
         self.root = root
         self.kilvo = kilvo
+        self.path = path
+        self.folder = ""  # where the commands are run
         self.faults: list[str] = []
         self.checked = 0
         self.helps: dict[tuple[str, ...], str | None] = {}
-        self.text = re.sub(r"<!--.*?-->", lambda comment: re.sub(r"[^\n]", "", comment.group()), self.read("README.md"), flags=re.S)
+        self.text = re.sub(r"<!--.*?-->", lambda comment: re.sub(r"[^\n]", "", comment.group()), self.read(path), flags=re.S)
         makefile = self.read("Makefile")
         self.targets = set(" ".join(re.findall(r"^([\w\- ]+):(?!=)", makefile, re.M)).split())
         self.variables = set(re.findall(r"\$\((\w+)\)|^(?:ifdef\s+)?(\w+)\s*(?:[?:]?=|$)", makefile, re.M))
@@ -66,9 +72,19 @@ class Readme:
             return file.read()
 
     def fault(self, line: int, text: str) -> None:
-        self.faults.append(f"README.md:{line}: {text}")
+        self.faults.append(f"{self.path}:{line}: {text}")
 
     def check(self) -> list[str]:
+        if self.path == "README.md" and self.text.count("\n") > LINES:
+            self.fault(LINES + 1, f"a first page of more than {LINES} lines")
+        with tempfile.TemporaryDirectory() as self.folder:
+            self.check_blocks()
+        for match in re.finditer(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", self.text):
+            if not os.path.exists(os.path.join(self.root, os.path.dirname(self.path), match[1])):
+                self.fault(self.text.count("\n", 0, match.start()) + 1, f"{match[1]} does not exist")
+        return self.faults
+
+    def check_blocks(self) -> None:
         for block in blocks(self.text):
             kind, _, marker = block.kind.partition(" ")
             if kind == "sh" and marker in ("", "needs-recording"):
@@ -77,14 +93,12 @@ class Readme:
                     self.check_command(line, words, marker)
             elif kind in ("cmake", "cpp"):
                 self.check_code(block, "tests/consumer/CMakeLists.txt" if kind == "cmake" else "tests/consumer/main.cpp")
+            elif kind == "yaml" and marker:
+                self.check_configuration(block, marker)
             elif kind == "yaml":
                 self.check_keys(block)
             elif kind != "text":
                 self.fault(block.line - 1, f"a block of kind `{block.kind}`, which is none of those that are checked")
-        for match in re.finditer(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", self.text):
-            if not os.path.exists(os.path.join(self.root, match[1])):
-                self.fault(self.text.count("\n", 0, match.start()) + 1, f"{match[1]} does not exist")
-        return self.faults
 
     def check_command(self, line: int, words: list[str], marker: str) -> None:
         program = words[0]
@@ -110,9 +124,8 @@ class Readme:
         if marker == "needs-recording":
             self.look_up(line, words)
             return
-        with tempfile.TemporaryDirectory() as folder:
-            words = [os.path.join(self.root, word) if word.startswith("config/") else word for word in words]
-            done = subprocess.run([self.kilvo, *words], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=TIMEOUT_S)
+        words = [os.path.join(self.root, word) if word.startswith("config/") else word for word in words]
+        done = subprocess.run([self.kilvo, *words], cwd=self.folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=TIMEOUT_S)
         if done.returncode:
             self.fault(line, f"`kilvo {' '.join(words)}` ends with {done.returncode}: {done.stderr.strip()[-300:]}")
 
@@ -145,15 +158,23 @@ class Readme:
                     return
                 rest = rest[rest.index(line.strip()) + 1:]
 
+    def check_configuration(self, block: Block, name: str) -> None:
+        with open(os.path.join(self.folder, name), "w", encoding="utf-8") as file:
+            file.write("\n".join(block.lines) + "\n")
+        if self.kilvo:
+            self.check_kilvo(block.line, ["config", "check", name], "")
+
     def check_keys(self, block: Block) -> None:
         if not os.path.exists(os.path.join(self.root, "config/robots/g1.yaml")):
             self.fault(block.line, "there is no config/robots/g1.yaml to hold this against")
             return
-        known = set(re.findall(r"([\w-]+):", re.sub(r"#.*", "", self.read("config/robots/g1.yaml"))))
+        known = {"q", "rpy", *re.findall(r"([\w-]+):", re.sub(r"#.*", "", self.read("config/robots/g1.yaml")))}
+        if os.path.exists(os.path.join(self.root, "docs/parameters.md")):
+            known |= {word for key in re.findall(r"^\| `([\w.]+)`", self.read("docs/parameters.md"), re.M) for word in key.split(".")}
         for number, line in enumerate(block.lines, block.line):
             for key in re.findall(r"([\w-]+):(?=\s|$)", re.sub(r"#.*", "", line)):
                 if key not in known:
-                    self.fault(number, f"{key}: is no key of config/robots/g1.yaml")
+                    self.fault(number, f"{key}: is no key of config/robots/g1.yaml or docs/parameters.md")
 
 
 def main() -> int:
@@ -161,9 +182,11 @@ def main() -> int:
     parser.add_argument("--root", default=ROOT, help="the project")
     parser.add_argument("--kilvo", help="the program; without it verbs and options are not looked up")
     options = parser.parse_args()
-    readme = Readme(options.root, options.kilvo)
-    faults = readme.check()
-    print("\n".join(faults + [f"readme: {readme.checked} commands, {len(faults)} faults" + ("" if options.kilvo else "; no program to ask")]))
+    paths = ["README.md", *sorted(glob.glob("docs/*.md", root_dir=options.root))]
+    pages = [Page(options.root, options.kilvo, path) for path in paths]
+    faults = [fault for page in pages for fault in page.check()]
+    checked = sum(page.checked for page in pages)
+    print("\n".join(faults + [f"readme: {checked} commands on {len(pages)} pages, {len(faults)} faults" + ("" if options.kilvo else "; no program to ask")]))
     return 1 if faults else 0
 
 

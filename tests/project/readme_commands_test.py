@@ -98,7 +98,7 @@ class ReadmeCommands(unittest.TestCase):
 
     def test_key_that_no_configuration_has(self):
         self.assert_true("```yaml\nimu:\n  rate: 100  # so: fast\n```\n")
-        self.assert_untrue("```yaml\nimu: {speed: 100}\n```\n", "README.md:2: speed: is no key of config/robots/g1.yaml")
+        self.assert_untrue("```yaml\nimu: {speed: 100}\n```\n", "README.md:2: speed: is no key of config/robots/g1.yaml or docs/parameters.md")
 
     def test_block_that_nobody_checks(self):
         self.assert_untrue("```bash\nkilvo run\n```\n", "README.md:1: a block of kind `bash`")

@@ -1,0 +1,42 @@
+"""Holds documents, public names, comments and messages to the glossary of docs/notation.md: the words that it replaces are not used.
+
+Looked at: README.md, CHANGELOG.md's unreleased part, docs/ (the dated decisions apart), and all sources."""
+import argparse
+import glob
+import os
+import re
+import sys
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.join(ROOT, "scripts"))
+import cpp_text  # noqa: E402  (from scripts/)
+
+# "room", "wall", "floor" and "door" are things that a robot sees; as parts of a program they come with these words.
+OLD = re.compile(r"forerunner|footfall|\bhouse\b|\bpolice\b|\bconductor\b|\bthe desk\b|\bthe doors\b|\brooms\.txt\b|kilvo_room\b|check_rooms|\bthe walls? of the (?:code|project)\b|"
+                 r"\bwithout a word\b|\bby its own word\b|\b(?:is|are|was|were|be) said\b|\bspoken of\b|\bLiDAR sense\b", re.I)
+GLOSSARY = "docs/notation.md"
+
+
+def texts(root: str) -> list[tuple[str, str]]:
+    files = ["README.md", *glob.glob("docs/*.md", root_dir=root), *cpp_text.sources(root)]
+    found = [(path, cpp_text.read(root, path)) for path in files if os.path.exists(os.path.join(root, path)) and path != GLOSSARY]
+    if os.path.exists(os.path.join(root, "CHANGELOG.md")):
+        found.append(("CHANGELOG.md", cpp_text.read(root, "CHANGELOG.md").split("\n## [0")[0]))
+    return found
+
+
+def check(root: str) -> list[str]:
+    return [f"{path}:{number}: `{match[0]}`: see the glossary in {GLOSSARY}"
+            for path, text in texts(root) for number, line in enumerate(text.splitlines(), 1) for match in OLD.finditer(line)]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--root", default=ROOT, help="the project")
+    faults = check(parser.parse_args().root)
+    print("\n".join(faults + [f"words: {len(faults)} faults"]))
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

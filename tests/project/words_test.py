@@ -1,0 +1,29 @@
+"""words.py: finds each old word where it must not be, and only there."""
+import os
+import tempfile
+import unittest
+
+import words
+
+
+class Words(unittest.TestCase):
+    def faults(self, path: str, text: str) -> list[str]:
+        with tempfile.TemporaryDirectory() as root:
+            os.makedirs(os.path.join(root, os.path.dirname(path)), exist_ok=True)
+            with open(os.path.join(root, path), "w", encoding="utf-8") as file:
+                file.write(text)
+            return words.check(root)
+
+    def test_finds_old_words_with_their_line(self):
+        self.assertRegex(self.faults("docs/live.md", "a\nThe forerunner runs.\n")[0], r"^docs/live.md:2: `forerunner`")
+        self.assertEqual(len(self.faults("kilvo/legs/x.hpp", "// It is said that\nclass Footfall;\n")), 2)
+        self.assertEqual(len(self.faults("CHANGELOG.md", "## [Unreleased]\n- is said\n\n## [0.1.0]\n- is said\n")), 1)
+
+    def test_leaves_decisions_the_glossary_and_real_rooms_alone(self):
+        self.assertEqual(self.faults("docs/decisions/old.md", "forerunner\n"), [])
+        self.assertEqual(self.faults("docs/notation.md", "forerunner\n"), [])
+        self.assertEqual(self.faults("README.md", "A room with a floor, walls and a door.\n"), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
