@@ -180,7 +180,9 @@ class Run {
 
   void tell_end() const {
     const RunSummary& run_summary = files_.run_summary();
-    for (const std::string& text : all_warnings(facts_, source_, estimator_.statistics())) fmt::print(stderr, "kilvo: warning: {}\n", text);
+    const std::vector<std::string> warnings = all_warnings(facts_, source_, estimator_.statistics());
+    for (const std::string& text : warnings) fmt::print(stderr, "kilvo: warning: {}\n", text);
+    if (!warnings.empty() && !options_.quiet) fmt::print(stderr, "kilvo: what to do about warnings: docs/troubleshooting.md\n");
     if (!facts_.failure.empty()) fmt::print(stderr, "kilvo: error: {}\n", facts_.failure);
     if (options_.quiet) return;
     fmt::print("{}: {} poses, {} sweeps, path {:.2f} m, start to end {:.3f} m, {:.1f} s of data in {:.2f} s\n", options_.out.string(),
