@@ -89,12 +89,14 @@ int info(const InfoOptions& options) {
     wanted[sensor].topic = settings.topic(sensor);
   }
   const lab::RecordingDescription about = lab::describe_recording(options.input, wanted);
-  fmt::print("{}: {:.1f} MB, {:.3f} s, {} messages in {} chunks ({})\n", about.file, static_cast<double>(about.bytes) * 1e-6,
-             to_seconds(about.end - about.begin), about.messages, about.chunks, about.compression);
+  const std::string chunks = about.storage.chunks > 0 ? fmt::format(" in {} chunks", about.storage.chunks) : "";
+  fmt::print("{}: {}, {:.1f} MB, {:.3f} s, {} messages{} ({})\n", about.file, about.storage.format, static_cast<double>(about.bytes) * 1e-6,
+             to_seconds(about.end - about.begin), about.messages, chunks, about.storage.compression);
   fmt::print("use: with {}\n", config.string());
   print_topics(about);
   print_joints(options, settings, wanted);
-  for (const lab::Damage& damage : about.damages) fmt::print("damaged at byte {}: {}\n", damage.offset, damage.reason);
+  for (const lab::Damage& damage : about.damages)
+    fmt::print("damaged at byte {}{}: {}\n", damage.offset, damage.file.empty() ? "" : " of " + damage.file, damage.reason);
   return done;
 }
 

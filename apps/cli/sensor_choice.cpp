@@ -49,15 +49,15 @@ std::vector<Sensor> as_wanted(const std::vector<Sensor>& wanted, const lab::Sett
 
 std::set<std::string> topics_of(const std::string& input) {
   std::set<std::string> out;
-  const lab::Rosbag1Reader reader = lab::open_recording(input);
-  for (const auto& [id, connection] : reader.connections()) out.insert(connection.topic);
+  const auto reader = lab::open_recording(input);
+  for (const auto& [id, connection] : reader->connections()) out.insert(connection.topic);
   return out;
 }
 
 // A topic of the sensor's kind that no setting names: then the setting is misspelt, and the sensor is not simply absent.
 std::optional<std::string> unnamed_topic(Sensor sensor, const lab::Settings& settings, const std::string& input) {
-  const lab::Rosbag1Reader reader = lab::open_recording(input);
-  for (const auto& [id, connection] : reader.connections()) {
+  const auto reader = lab::open_recording(input);
+  for (const auto& [id, connection] : reader->connections()) {
     if (!lab::is_type_of(sensor, connection.type)) continue;
     const bool named = std::ranges::any_of(every_sensor, [&](Sensor other) {
       return settings.has(other) && lab::topic_matches(other, settings.topic(other), connection.topic);

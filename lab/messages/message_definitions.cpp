@@ -2,6 +2,7 @@
 #include <array>
 
 #include "lab/messages/encode.hpp"
+#include "lab/messages/message_schema.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -87,7 +88,102 @@ time stamp
 string frame_id
 )"};
 
+constexpr std::string_view compressed_image = R"(Header header
+string format
+uint8[] data
+)";
+
+constexpr std::string_view livox = R"(Header header
+uint64 timebase
+uint32 point_num
+uint8 lidar_id
+uint8[3] rsvd
+CustomPoint[] points
+================================================================================
+MSG: livox_ros_driver2/CustomPoint
+uint32 offset_time
+float32 x
+float32 y
+float32 z
+uint8 reflectivity
+uint8 tag
+uint8 line
+)";
+
+constexpr std::string_view transforms = R"(geometry_msgs/TransformStamped[] transforms
+================================================================================
+MSG: geometry_msgs/TransformStamped
+Header header
+string child_frame_id
+geometry_msgs/Transform transform
+================================================================================
+MSG: geometry_msgs/Transform
+geometry_msgs/Vector3 translation
+geometry_msgs/Quaternion rotation
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+)";
+
+constexpr std::string_view odometry = R"(Header header
+string child_frame_id
+geometry_msgs/PoseWithCovariance pose
+geometry_msgs/TwistWithCovariance twist
+================================================================================
+MSG: geometry_msgs/PoseWithCovariance
+geometry_msgs/Pose pose
+float64[36] covariance
+================================================================================
+MSG: geometry_msgs/TwistWithCovariance
+geometry_msgs/Twist twist
+float64[36] covariance
+================================================================================
+MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+================================================================================
+MSG: geometry_msgs/Twist
+geometry_msgs/Vector3 linear
+geometry_msgs/Vector3 angular
+================================================================================
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+)";
+
 }  // namespace
+
+std::string_view known_definition(std::string_view type) {
+  for (const MessageType* known : {&imu, &joint_state, &point_cloud2, &image}) {
+    if (known->name == type) return known->definition;
+  }
+  if (type == "sensor_msgs/CompressedImage") return compressed_image;
+  if (type == "livox_ros_driver2/CustomMsg") return livox;
+  if (type == "tf2_msgs/TFMessage") return transforms;
+  if (type == "nav_msgs/Odometry") return odometry;
+  if (type == "std_msgs/String") return "string data\n";
+  return {};
+}
 
 const MessageType& written_type(Sensor sensor) {
   static constexpr std::array<const MessageType*, sensor_count> types{&imu, &joint_state, &point_cloud2, &image};

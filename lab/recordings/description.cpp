@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <set>
 
 #include "lab/messages/input_error.hpp"
 #include "lab/messages/message_decoder.hpp"
@@ -34,7 +33,7 @@ std::string detail_of(const CameraImage& image) {
   return std::to_string(image.image.width) + "x" + std::to_string(image.image.height) + (image.image.channels == 1 ? " grey" : " colour");
 }
 
-std::string point_time_of(Rosbag1Reader& reader, const TopicDescription& topic) {
+std::string point_time_of(RecordingReader& reader, const TopicDescription& topic) {
   try {
     const auto format = find_point_time(reader, {topic.topic, topic.type}, 0);
     return format ? "point time " + format->text() : "no clouds with points";
@@ -44,13 +43,13 @@ std::string point_time_of(Rosbag1Reader& reader, const TopicDescription& topic) 
 }
 
 /// Reads the first message only.
-std::string first_of(Rosbag1Reader& reader, const TopicDescription& topic) {
-  reader.select([&](const BagConnection& c) { return c.topic == topic.topic && c.type == topic.type; }, topic.first);
+std::string first_of(RecordingReader& reader, const TopicDescription& topic) {
+  reader.select([&](const Channel& c) { return c.topic == topic.topic && c.type == topic.type; }, topic.first);
   const auto message = reader.next();
   if (!message) return "not readable";
   std::string details;
   for (const Sensor sensor : topic.fits) {
-    const auto decoded = decode_measurement(sensor, topic.type, message->bytes, {});
+    const auto decoded = decode_measurement(sensor, topic.type, message->wire(), {});
     const auto detail = decoded ? std::visit([](const auto& m) { return detail_of(m); }, decoded->measurement) : decoded.reason();
     details += (details.empty() ? "" : "; ") + detail;
   }
@@ -68,12 +67,13 @@ void add(TopicDescription& topic, const TimesSummary& times) {
 }
 
 /// Topics by name and type: one entry for all the publishers of a topic.
-std::vector<TopicDescription> list_topics(const Rosbag1Reader& reader) {
+std::vector<TopicDescription> list_topics(const RecordingReader& reader) {
   std::map<std::pair<std::string, std::string>, TopicDescription> topics;
   for (const auto& [id, connection] : reader.connections()) {
     auto& topic = topics[{connection.topic, connection.type}];
     topic.topic = connection.topic;
     topic.type = connection.type;
+    topic.encoding = connection.encoding;
     topic.fits = sensors_of_type(connection.type);
     const auto times = reader.times().find(id);
     if (times != reader.times().end()) add(topic, times->second);
@@ -84,7 +84,7 @@ std::vector<TopicDescription> list_topics(const Rosbag1Reader& reader) {
   return list;
 }
 
-void mark_used(RecordingDescription& description, const Rosbag1Reader& reader, const RecordingOptions& options) {
+void mark_used(RecordingDescription& description, const RecordingReader& reader, const RecordingOptions& options) {
   for (int i = 0; i < sensor_count; ++i) {
     const auto sensor = static_cast<Sensor>(i);
     if (options[sensor].topic.empty()) continue;
@@ -101,17 +101,15 @@ void mark_used(RecordingDescription& description, const Rosbag1Reader& reader, c
 
 }  // namespace
 
-RecordingDescription describe_recording(const std::filesystem::path& input, const RecordingOptions& options) {
-  Rosbag1Reader reader = open_recording(input);
+RecordingDescription describe_recording(const std::vector<std::filesystem::path>& inputs, const RecordingOptions& options) {
+  const auto opened = open_recordings(inputs);
+  RecordingReader& reader = *opened;
   RecordingDescription description;
   description.file = reader.name();
   description.bytes = reader.file_size();
   description.begin = reader.begin();
   description.end = reader.end();
-  description.chunks = reader.chunks().size();
-  std::set<std::string> compressions;
-  for (const auto& chunk : reader.chunks()) compressions.insert(chunk.compression);
-  for (const auto& name : compressions) description.compression += (description.compression.empty() ? "" : " ") + name;
+  description.storage = reader.storage();
   for (const auto& [id, times] : reader.times()) description.messages += times.count;
   description.topics = list_topics(reader);
   for (auto& topic : description.topics) {

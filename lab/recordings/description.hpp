@@ -8,6 +8,7 @@ namespace kilvo::lab {
 struct TopicDescription {
   std::string topic;
   std::string type;
+  Encoding encoding = Encoding::ros1;
   std::uint64_t count = 0;
   Time first{}, last{};          // recorded; both 0 when there are no messages
   double rate = 0;               // Hz over that time; 0 below two messages
@@ -21,8 +22,7 @@ struct RecordingDescription {
   std::string file;
   std::uint64_t bytes = 0;
   Time begin{}, end{};
-  std::string compression;  // "none", "lz4", "bz2" or several, "none lz4"
-  std::size_t chunks = 0;
+  StorageSummary storage;
   std::uint64_t messages = 0;
   std::vector<TopicDescription> topics;  // by name
   std::vector<Damage> damages;
@@ -30,6 +30,9 @@ struct RecordingDescription {
 
 /// Needs a few milliseconds for each gigabyte. Of the options only the topics matter. Throws InputError as open_recording() does; a
 /// topic that cannot be used is no error.
-RecordingDescription describe_recording(const std::filesystem::path& input, const RecordingOptions& options = {});
+RecordingDescription describe_recording(const std::vector<std::filesystem::path>& inputs, const RecordingOptions& options = {});
+inline RecordingDescription describe_recording(const std::filesystem::path& input, const RecordingOptions& options = {}) {
+  return describe_recording(std::vector{input}, options);
+}
 
 }  // namespace kilvo::lab

@@ -27,7 +27,7 @@ TEST(DescribeRecording, ListsTopicsWithRatesAndUses) {
   const auto description = describe_recording(folder / "walk.bag", options);
   EXPECT_EQ(description.file, (folder / "walk.bag").string());
   EXPECT_EQ(description.bytes, std::filesystem::file_size(folder / "walk.bag"));
-  EXPECT_EQ(description.compression, "none");
+  EXPECT_EQ(description.storage.compression, "none");
   EXPECT_EQ(description.messages, tiny_walk().size());
   EXPECT_TRUE(description.damages.empty());
   ASSERT_EQ(description.topics.size(), 4U);

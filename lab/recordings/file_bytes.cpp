@@ -21,6 +21,11 @@ FileBytes::FileBytes(const std::filesystem::path& path) : name_(path.string()) {
   if (error) size_ = 0;
 }
 
+FileBytes::FileBytes(std::string name, int descriptor) : name_(std::move(name)), descriptor_(descriptor) {
+  const off_t size = ::lseek(descriptor, 0, SEEK_END);
+  size_ = size < 0 ? 0 : static_cast<std::uint64_t>(size);
+}
+
 FileBytes::~FileBytes() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }

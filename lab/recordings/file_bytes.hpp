@@ -14,6 +14,8 @@ class FileBytes {
  public:
   /// Throws InputError when the file is missing, a directory, or not readable.
   explicit FileBytes(const std::filesystem::path& path);
+  /// An open file, which is closed in the end; `name` is what messages call it.
+  FileBytes(std::string name, int descriptor);
   explicit FileBytes(std::vector<std::uint8_t> content) : name_("bytes in memory"), content_(std::move(content)), size_(content_.size()) {}
   ~FileBytes();
   FileBytes(FileBytes&& other) noexcept;

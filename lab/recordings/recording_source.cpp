@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "lab/messages/input_error.hpp"
-#include "lab/messages/message_decoder.hpp"
 #include "lab/messages/point_time_search.hpp"
 #include "lab/recordings/recording_file.hpp"
 
@@ -20,13 +19,13 @@ std::string plural(std::uint64_t count, const std::string& what) { return std::t
 
 }  // namespace
 
-std::optional<PointTimeFormat> find_point_time(Rosbag1Reader& reader, const ChosenTopic& lidar, double nominal_rate) {
-  reader.select([&](const BagConnection& c) { return c.topic == lidar.topic && c.type == lidar.type; });
+std::optional<PointTimeFormat> find_point_time(RecordingReader& reader, const ChosenTopic& lidar, double nominal_rate) {
+  reader.select([&](const Channel& c) { return c.topic == lidar.topic && c.type == lidar.type; });
   PointTimeSearch search(lidar.type, nominal_rate);
   while (!search.has_enough()) {
     const auto message = reader.next();
     if (!message) break;
-    search.look_at(message->bytes);
+    search.look_at(message->wire());
   }
   if (!search.has_any()) return std::nullopt;
   auto format = search.decide();
@@ -34,32 +33,32 @@ std::optional<PointTimeFormat> find_point_time(Rosbag1Reader& reader, const Chos
   return *std::move(format);
 }
 
-RecordingSource::RecordingSource(const std::filesystem::path& input, RecordingOptions options)
-    : reader_(open_recording(input)), options_(std::move(options)) {
+RecordingSource::RecordingSource(const std::vector<std::filesystem::path>& inputs, RecordingOptions options)
+    : reader_(open_recordings(inputs)), options_(std::move(options)) {
   for (int i = 0; i < sensor_count; ++i) {
     const auto sensor = static_cast<Sensor>(i);
     if (!options_[sensor].use) continue;
     intakes_[static_cast<std::size_t>(i)] = SensorIntake(options_[sensor].time_offset);
     try {
-      chosen_[static_cast<std::size_t>(i)] = choose_topic(reader_.connections(), sensor, options_[sensor].topic);
+      chosen_[static_cast<std::size_t>(i)] = choose_topic(reader_->connections(), sensor, options_[sensor].topic);
     } catch (const InputError& error) {
-      throw InputError(reader_.name() + ": " + error.what());
+      throw InputError(reader_->name() + ": " + error.what());
     }
   }
   const ChosenTopic& lidar = chosen_[static_cast<std::size_t>(Sensor::lidar)];
   if (!lidar.topic.empty() && !options_.no_deskew) {
-    point_time_ = find_point_time(reader_, lidar, options_[Sensor::lidar].rate).value_or(PointTimeFormat{});
+    point_time_ = find_point_time(*reader_, lidar, options_[Sensor::lidar].rate).value_or(PointTimeFormat{});
   }
-  const Time from = after(reader_.begin(), options_.start);
-  const auto is_chosen = [&](const BagConnection& c) {
+  const Time from = after(reader_->begin(), options_.start);
+  const auto is_chosen = [&](const Channel& c) {
     return std::ranges::any_of(chosen_, [&](const ChosenTopic& chosen) { return c.topic == chosen.topic && c.type == chosen.type; });
   };
-  reader_.select(is_chosen, from, from == Time::max() ? from : after(from, options_.duration));
+  reader_->select(is_chosen, from, from == Time::max() ? from : after(from, options_.duration));
 }
 
 std::optional<Measurement> RecordingSource::decode(Sensor sensor, const RawMessage& message) {
   SensorIntake& intake = intakes_[static_cast<std::size_t>(sensor)];
-  if (message.size <= most_message_bytes) return intake.take(sensor, message.connection->type, message.bytes, message.time, point_time_);
+  if (message.size <= most_message_bytes) return intake.take(sensor, message.connection->type, message.wire(), message.time, point_time_);
   intake.refuse_too_large();
   return std::nullopt;
 }
@@ -75,7 +74,7 @@ std::optional<Measurement> RecordingSource::next() {
         return measurement;
       }
     }
-    message_ = reader_.next();
+    message_ = reader_->next();
     if (!message_) return std::nullopt;
     recorded_ = message_->time;
     next_sensor_ = 0;
@@ -84,9 +83,10 @@ std::optional<Measurement> RecordingSource::next() {
 
 std::vector<std::string> RecordingSource::warnings() const {
   std::vector<std::string> texts;
-  const auto& damages = reader_.damages();
+  const auto& damages = reader_->damages();
   if (!damages.empty()) {
-    std::string text = reader_.name() + ": damaged at byte " + std::to_string(damages.front().offset) + ": " + damages.front().reason;
+    const std::string& file = damages.front().file.empty() ? reader_->name() : damages.front().file;
+    std::string text = file + ": damaged at byte " + std::to_string(damages.front().offset) + ": " + damages.front().reason;
     if (damages.size() > 1) text += " (and in " + plural(damages.size() - 1, "more place") + ")";
     texts.push_back(text + "; what could be read is used");
   }
@@ -111,8 +111,8 @@ std::vector<std::string> RecordingSource::warnings() const {
     }
   }
   if (!point_time_.usual_span) texts.push_back(topic(Sensor::lidar) + ": point times in " + point_time_.text());
-  if (reader_.late_messages() > 0) {
-    texts.push_back(plural(reader_.late_messages(), "message") + " came out of order: the chunks of the recording overlap too deeply");
+  if (reader_->late_messages() > 0) {
+    texts.push_back(plural(reader_->late_messages(), "message") + " came out of order: the chunks of the recording overlap too deeply");
   }
   return texts;
 }

@@ -12,7 +12,7 @@
 #include "kilvo/sensors/measurement_source.hpp"
 #include "lab/messages/point_time.hpp"
 #include "lab/messages/sensor_intake.hpp"
-#include "lab/recordings/rosbag1_reader.hpp"
+#include "lab/recordings/recording_reader.hpp"
 #include "lab/recordings/topic_choice.hpp"
 
 namespace kilvo::lab {
@@ -38,7 +38,9 @@ struct RecordingOptions {
 class RecordingSource final : public MeasurementSource {
  public:
   /// Throws InputError: no such recording, a used sensor without a topic or with one of a wrong type, clouds without point times.
-  RecordingSource(const std::filesystem::path& input, RecordingOptions options);
+  RecordingSource(const std::filesystem::path& input, RecordingOptions options) : RecordingSource(std::vector{input}, std::move(options)) {}
+  /// Several recordings as one.
+  RecordingSource(const std::vector<std::filesystem::path>& inputs, RecordingOptions options);
 
   std::optional<Measurement> next() override;
 
@@ -46,9 +48,9 @@ class RecordingSource final : public MeasurementSource {
   Time recorded() const { return recorded_; }
 
   /// Over the whole file: time of the first recorded message, and from there to the last.
-  Time begin() const { return reader_.begin(); }
-  Duration duration() const { return reader_.end() - reader_.begin(); }
-  double progress() const { return reader_.progress(); }  // 0 to 1
+  Time begin() const { return reader_->begin(); }
+  Duration duration() const { return reader_->end() - reader_->begin(); }
+  double progress() const { return reader_->progress(); }  // 0 to 1
 
   /// Empty when the sensor is not used.
   const std::string& topic(Sensor s) const { return chosen_[static_cast<std::size_t>(s)].topic; }
@@ -57,15 +59,15 @@ class RecordingSource final : public MeasurementSource {
 
   /// Of the messages within [start, start + duration).
   const SensorCounts& counts(Sensor s) const { return intakes_[static_cast<std::size_t>(s)].counts(); }
-  bool input_damaged() const { return reader_.damage().has_value(); }
-  std::optional<Damage> damage() const { return reader_.damage(); }
+  bool input_damaged() const { return reader_->damage().has_value(); }
+  std::optional<Damage> damage() const { return reader_->damage(); }
   /// What the user should know, one sentence each; complete when next() has given nothing.
   std::vector<std::string> warnings() const;
 
  private:
   std::optional<Measurement> decode(Sensor sensor, const RawMessage& message);
 
-  Rosbag1Reader reader_;
+  std::unique_ptr<RecordingReader> reader_;
   RecordingOptions options_;
   std::array<ChosenTopic, sensor_count> chosen_;
   PointTimeFormat point_time_;
@@ -77,6 +79,6 @@ class RecordingSource final : public MeasurementSource {
 
 /// Looks at the first clouds of a LiDAR topic. Afterwards the reader must be given its selection again. Throws InputError, naming the
 /// topic and its fields, when the clouds do not say when their points were measured; nothing is found when there are no clouds at all.
-std::optional<PointTimeFormat> find_point_time(Rosbag1Reader& reader, const ChosenTopic& lidar, double nominal_rate);
+std::optional<PointTimeFormat> find_point_time(RecordingReader& reader, const ChosenTopic& lidar, double nominal_rate);
 
 }  // namespace kilvo::lab

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "lab/recordings/rosbag1_inflate.hpp"
+#include "lab/recordings/inflate.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -48,7 +48,7 @@ void BagChunkReader::note(std::uint64_t offset, const std::string& reason) {
   position_ = size_;
 }
 
-std::optional<BagEntry> BagChunkReader::scan(const std::function<void(const BagConnection&)>& on_connection) {
+std::optional<MessageEntry> BagChunkReader::scan(const std::function<void(const Channel&)>& on_connection) {
   const std::uint64_t end = on_connection ? size_ : good_;
   while (position_ < end) {
     const std::uint64_t begin = position_;
@@ -65,7 +65,7 @@ std::optional<BagEntry> BagChunkReader::scan(const std::function<void(const BagC
     position_ = data + data_size;
     if (header->op == BagOp::message && header->connection && header->time) {
       if (position_ > good_) continue;
-      return BagEntry{*header->time, data, data_size, *header->connection};
+      return MessageEntry{*header->time, data, data_size, *header->connection};
     }
     if (header->op != BagOp::connection) {
       note(begin, "a record in a chunk that does not belong there");
@@ -84,7 +84,7 @@ std::optional<BagEntry> BagChunkReader::scan(const std::function<void(const BagC
   return std::nullopt;
 }
 
-Bytes BagChunkReader::message(const BagEntry& entry) {
+std::optional<Bytes> BagChunkReader::message(const MessageEntry& entry) {
   if (is_compressed(chunk_) || entry.size <= window_bytes) return view(entry.offset, entry.size);
   large_.resize(entry.size);
   return Bytes(large_).first(file_->read_at(chunk_.data_offset + entry.offset, large_));

@@ -26,7 +26,7 @@ std::vector<PlacedMessage> place_messages(const Content& content) {
     BagChunkReader reader(file, chunk);
     const std::uint64_t chunk_end = chunk.data_offset + chunk.data_size;
     while (const auto entry = reader.scan()) {
-      const Bytes bytes = reader.message(*entry);
+      const Bytes bytes = *reader.message(*entry);
       const std::uint64_t end = chunk.compression == "none" ? chunk.data_offset + entry->offset + entry->size : chunk_end;
       placed.push_back({{entry->connection, entry->time, {bytes.begin(), bytes.end()}}, chunk.offset, chunk_end, end});
     }

@@ -215,30 +215,6 @@ class Walk {
 
 }  // namespace
 
-void TimesSummary::add(Time t) {
-  if (count == 0) {
-    first = last = t;
-  } else if (t >= last) {
-    largest_gap = std::max(largest_gap, t - last);
-    last = t;
-  } else {
-    first = std::min(first, t);
-  }
-  ++count;
-}
-
-void TimesSummary::append(const TimesSummary& later) {
-  if (count == 0) {
-    *this = later;
-    return;
-  }
-  if (later.count == 0) return;
-  largest_gap = std::max({largest_gap, later.largest_gap, later.first - last});
-  first = std::min(first, later.first);
-  last = std::max(last, later.last);
-  count += later.count;
-}
-
 BagLayout read_bag_layout(const FileBytes& file) {
   if (file.size() == 0) throw InputError(file.name() + ": the file is empty");
   std::vector<std::uint8_t> begin(bag_magic.size());

@@ -6,25 +6,10 @@
 #include <set>
 #include <vector>
 
-#include "lab/recordings/file_bytes.hpp"
+#include "lab/recordings/chunked_reader.hpp"
 #include "lab/recordings/rosbag1_record.hpp"
 
 namespace kilvo::lab {
-
-/// The times at which messages of one connection were recorded.
-struct TimesSummary {
-  std::uint64_t count = 0;
-  Time first{}, last{};
-  Duration largest_gap{};
-
-  void add(Time t);
-  void append(const TimesSummary& later);
-};
-
-struct Damage {
-  std::uint64_t offset = 0;  // bytes from the beginning of the file
-  std::string reason;
-};
 
 struct BagChunk {
   std::uint64_t offset = 0;       // of the chunk's record
@@ -39,15 +24,13 @@ struct BagChunk {
 };
 
 struct BagLayout {
-  std::vector<BagChunk> chunks;                   // in the order of the file
-  std::map<std::uint32_t, BagConnection> footer;  // connection records at the end of the bag
-  std::map<std::uint32_t, TimesSummary> times;    // by connection, over the indexed chunks
-  std::vector<Damage> damages;                    // in the order of the file; at most most_damages
+  std::vector<BagChunk> chunks;                 // in the order of the file
+  std::map<std::uint32_t, Channel> footer;      // connection records at the end of the bag
+  std::map<std::uint32_t, TimesSummary> times;  // by connection, over the indexed chunks
+  std::vector<Damage> damages;                  // in the order of the file; at most most_damages
 };
 
-inline constexpr std::size_t most_damages = 100;
 inline constexpr std::size_t most_chunks = 1'000'000;  // 0.7 TB of them
-inline constexpr std::size_t most_connections = 10'000;
 
 /// Throws InputError when this is no ROS 1 bag 2.0 at all; anything worse inside is damage, which is skipped to the next chunk.
 BagLayout read_bag_layout(const FileBytes& file);

@@ -10,7 +10,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const PointTimeFormat time{"timestamp", "float64", TimeUnit::nanoseconds, TimeReference::absolute, true};
     while (const auto message = reader.next()) {
       const auto& type = message->connection->type;
-      for (const Sensor sensor : sensors_of_type(type)) (void)decode_measurement(sensor, type, message->bytes, time);
+      for (const auto sensor : sensors_of_type(type)) (void)decode_measurement(sensor, type, message->bytes, time);
     }
   } catch (const InputError&) {
     // Not a bag.

@@ -87,7 +87,7 @@ TEST(Rosbag1Reader, ReadsOnlyWhatIsSelectedAndCanStartAgain) {
   const TemporaryFolder folder;
   write_bag(folder / "walk.bag", tiny_walk());
   Rosbag1Reader reader(folder / "walk.bag");
-  const auto is_imu = [](const BagConnection& c) { return c.topic == "/imu"; };
+  const auto is_imu = [](const Channel& c) { return c.topic == "/imu"; };
   reader.select(is_imu);
   EXPECT_EQ(read_all(reader).size(), 50U);
   reader.select(is_imu, tiny_begin + std::chrono::milliseconds(100), tiny_begin + std::chrono::milliseconds(200));
@@ -95,7 +95,7 @@ TEST(Rosbag1Reader, ReadsOnlyWhatIsSelectedAndCanStartAgain) {
   ASSERT_EQ(part.size(), 10U);
   EXPECT_EQ(part.front().time, tiny_begin + std::chrono::milliseconds(100));
   EXPECT_EQ(part.back().time, tiny_begin + std::chrono::milliseconds(190));
-  reader.select([](const BagConnection&) { return false; });
+  reader.select([](const Channel&) { return false; });
   EXPECT_FALSE(reader.next());
 }
 
@@ -178,20 +178,18 @@ TEST(OpenRecording, SaysWhatIsWrongWithAnInputAndNamesIt) {
   const std::string name = path.string();
   EXPECT_EQ(error_of(path), name + ": no such file");
   EXPECT_EQ(with_content(""), name + ": the file is empty");
-  EXPECT_EQ(with_content("#ROS"), name + ": not a ROS 1 bag");
-  EXPECT_EQ(with_content("hello, world, this is no bag"), name + ": not a ROS 1 bag");
+  EXPECT_EQ(with_content("#ROS"), name + ": not a recording (a ROS 1 bag, MCAP, or rosbag2's .db3)");
+  EXPECT_EQ(with_content("hello, world, this is no bag"), name + ": not a recording (a ROS 1 bag, MCAP, or rosbag2's .db3)");
   EXPECT_EQ(with_content("#ROSBAG V1.2\nxyz"), name + ": only ROS bags of version 2.0 are read (rosbag fix converts older ones)");
-  EXPECT_NE(with_content("\x89MCAP0\r\nabc").find(name + ": a MCAP recording is recognised, but not read yet"), std::string::npos);
-  EXPECT_NE(
-      with_content({"SQLite format 3\0and more", 24}).find(name + ": a ROS 2 sqlite (.db3) recording is recognised, but not read yet"),
-      std::string::npos);
-  EXPECT_EQ(error_of(folder.path()), folder.path().string() + ": the folder has no recording.bag");
+  EXPECT_NE(with_content({"SQLite format 3\0and more", 24}).find(name + ": not a readable SQLite database"), std::string::npos);
+  EXPECT_EQ(error_of(folder.path()),
+            folder.path().string() + ": the folder has no recording.bag and no recording of rosbag2 (.mcap, .db3)");
 }
 
 TEST(OpenRecording, AFolderMeansTheRecordingInIt) {
   const TemporaryFolder folder;
   write_bag(folder / "recording.bag", tiny_walk(50));
-  EXPECT_EQ(open_recording(folder.path()).name(), (folder / "recording.bag").string());
+  EXPECT_EQ(open_recording(folder.path())->name(), (folder / "recording.bag").string());
   std::filesystem::remove(folder / "recording.bag");
   std::filesystem::create_directory(folder / "recording.bag");
   EXPECT_EQ(error_of(folder.path()), (folder / "recording.bag").string() + ": not a file");

@@ -62,9 +62,9 @@ std::optional<BagRecordHeader> parse_bag_header(Bytes header) {
   return parsed;
 }
 
-std::optional<BagConnection> parse_connection(const BagRecordHeader& header, Bytes data) {
+std::optional<Channel> parse_connection(const BagRecordHeader& header, Bytes data) {
   if (!header.connection) return std::nullopt;
-  BagConnection connection;
+  Channel connection;
   connection.id = *header.connection;
   connection.topic = header.topic;
   ByteReader reader(data);
@@ -73,6 +73,7 @@ std::optional<BagConnection> parse_connection(const BagRecordHeader& header, Byt
     if (!field) return std::nullopt;
     if (field->name == "type") connection.type = as_text(field->value);
     if (field->name == "md5sum") connection.md5sum = as_text(field->value);
+    if (field->name == "message_definition" && field->value.size() <= most_definition_bytes) connection.definition = as_text(field->value);
   }
   return connection.topic.empty() || connection.type.empty() ? std::nullopt : std::optional(std::move(connection));
 }

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "kilvo/sensors/time.hpp"
-#include "lab/messages/bytes.hpp"
+#include "lab/recordings/recording_reader.hpp"
 
 namespace kilvo::lab {
 
@@ -31,15 +31,7 @@ std::optional<BagRecordHeader> parse_bag_header(Bytes header);
 /// Headers longer than this are taken for damage.
 inline constexpr std::size_t most_header_bytes = 1 << 20;
 
-/// One topic as one publisher wrote it.
-struct BagConnection {
-  std::uint32_t id = 0;
-  std::string topic;
-  std::string type;  // "sensor_msgs/Imu"
-  std::string md5sum;
-};
-
 /// From the header and the data of a connection record.
-std::optional<BagConnection> parse_connection(const BagRecordHeader& header, Bytes data);
+std::optional<Channel> parse_connection(const BagRecordHeader& header, Bytes data);
 
 }  // namespace kilvo::lab

@@ -1,8 +1,8 @@
 #include "lab/recordings/rosbag1_writer.hpp"
 
 #include <algorithm>
-#include <lz4frame.h>
 
+#include "lab/recordings/deflate.hpp"
 #include "lab/recordings/rosbag1_record.hpp"
 
 namespace kilvo::lab {
@@ -43,30 +43,17 @@ class Header {
   ByteWriter fields_;
 };
 
-std::vector<std::uint8_t> connection_record(std::uint32_t id, const std::string& topic, const MessageType& type) {
+std::vector<std::uint8_t> connection_record(std::uint32_t id, const Channel& channel) {
   ByteWriter data;
   const auto text = [&](std::string_view name, std::string_view value) {
     data.put(static_cast<std::uint32_t>(name.size() + 1 + value.size())).append(name.data(), name.size()).put('=');
     data.append(value.data(), value.size());
   };
-  text("topic", topic);
-  text("type", type.name);
-  text("md5sum", type.md5sum);
-  text("message_definition", type.definition);
-  return Header(BagOp::connection).field("conn", id).text("topic", topic).with(data.bytes());
-}
-
-/// An LZ4 frame as roslz4 reads it: independent blocks, with a checksum over the content.
-std::vector<std::uint8_t> compress_lz4(Bytes bytes) {
-  LZ4F_preferences_t preferences{};
-  preferences.frameInfo.blockMode = LZ4F_blockIndependent;
-  preferences.frameInfo.blockSizeID = LZ4F_max1MB;
-  preferences.frameInfo.contentChecksumFlag = LZ4F_contentChecksumEnabled;
-  std::vector<std::uint8_t> frame(LZ4F_compressFrameBound(bytes.size(), &preferences));
-  const std::size_t size = LZ4F_compressFrame(frame.data(), frame.size(), bytes.data(), bytes.size(), &preferences);
-  if (LZ4F_isError(size) != 0) throw OutputError(std::string("lz4: ") + LZ4F_getErrorName(size));
-  frame.resize(size);
-  return frame;
+  text("topic", channel.topic);
+  text("type", channel.type);
+  text("md5sum", channel.md5sum);
+  text("message_definition", channel.definition);
+  return Header(BagOp::connection).field("conn", id).text("topic", channel.topic).with(data.bytes());
 }
 
 }  // namespace
@@ -83,7 +70,7 @@ Rosbag1Writer::~Rosbag1Writer() {
   try {
     close();
   } catch (const OutputError&) {
-    // SweepNoiseCorrelation to those who call close().
+    // For those who call close().
   }
 }
 
@@ -104,14 +91,19 @@ void Rosbag1Writer::write_bag_header(std::uint64_t index_pos) {
 }
 
 std::uint32_t Rosbag1Writer::add_connection(const std::string& topic, const MessageType& type) {
-  connections_.push_back({topic, type, false});
+  return add_channel({0, topic, std::string(type.name), std::string(type.md5sum), std::string(type.definition), Encoding::ros1});
+}
+
+std::uint32_t Rosbag1Writer::add_channel(const Channel& channel) {
+  if (channel.encoding != Encoding::ros1) throw OutputError(name_ + ": a ROS 1 bag holds messages of ROS 1 only");
+  connections_.push_back({channel, false});
   return static_cast<std::uint32_t>(connections_.size() - 1);
 }
 
 void Rosbag1Writer::write(std::uint32_t connection, Time recorded, Bytes message) {
   Connection& owner = connections_.at(connection);
   if (!owner.defined) {
-    const auto record = connection_record(connection, owner.topic, owner.type);
+    const auto record = connection_record(connection, owner.channel);
     content_.append(record.data(), record.size());
     owner.defined = true;
   }
@@ -128,7 +120,7 @@ void Rosbag1Writer::write_chunk() {
   const bool packed = compression_ == Compression::lz4;
   Header header(BagOp::chunk);
   header.text("compression", packed ? "lz4" : "none").field("size", static_cast<std::uint32_t>(content.size()));
-  put(header.with(packed ? compress_lz4(content) : content));
+  put(header.with(packed ? deflate_lz4(content) : content));
   for (const auto& [connection, entries] : index_) {
     ByteWriter data;
     for (const auto& entry : entries) {
@@ -155,7 +147,7 @@ void Rosbag1Writer::close() {
   closed_ = true;
   write_chunk();
   const std::uint64_t index_pos = position_;
-  for (std::uint32_t id = 0; id < connections_.size(); ++id) put(connection_record(id, connections_[id].topic, connections_[id].type));
+  for (std::uint32_t id = 0; id < connections_.size(); ++id) put(connection_record(id, connections_[id].channel));
   for (const auto& chunk : chunks_) {
     ByteWriter data;
     for (const auto& [connection, count] : chunk.counts) data.put(connection).put(count);

@@ -4,25 +4,19 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "lab/messages/byte_writer.hpp"
-#include "lab/messages/bytes.hpp"
 #include "lab/messages/encode.hpp"
+#include "lab/recordings/message_writer.hpp"
 
 namespace kilvo::lab {
-
-/// A file that cannot be created or written. The command line ends with exit code 2.
-struct OutputError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 /// As rosbag has it.
 inline constexpr std::size_t default_chunk_bytes = 768 << 10;
 
-class Rosbag1Writer {
+class Rosbag1Writer final : public MessageWriter {
  public:
   enum class Compression : std::uint8_t { none, lz4 };
 
@@ -30,26 +24,27 @@ class Rosbag1Writer {
   explicit Rosbag1Writer(const std::filesystem::path& path, Compression compression = Compression::none,
                          std::size_t chunk_bytes = default_chunk_bytes);
   /// Closes; a failure to do so is not told: call close() to hear of it.
-  ~Rosbag1Writer();
+  ~Rosbag1Writer() override;
   Rosbag1Writer(const Rosbag1Writer&) = delete;
   Rosbag1Writer& operator=(const Rosbag1Writer&) = delete;
 
   /// The id to write messages of this topic with.
   std::uint32_t add_connection(const std::string& topic, const MessageType& type);
+  /// Of a channel in the encoding of ROS 1, with its definition and sum.
+  std::uint32_t add_channel(const Channel& channel) override;
 
   /// `recorded`: when the message arrived; best given in ascending order. Throws OutputError when the disk is full.
-  void write(std::uint32_t connection, Time recorded, Bytes message);
+  void write(std::uint32_t connection, Time recorded, Bytes message) override;
 
   /// Ends the chunk in the making: what was written so far can be read, even if the bag is never closed.
-  void flush();
+  void flush() override;
 
   /// Writes the last chunk and the index. Throws OutputError.
-  void close();
+  void close() override;
 
  private:
   struct Connection {
-    std::string topic;
-    MessageType type;
+    Channel channel;
     bool defined = false;  // in a chunk
   };
   struct IndexEntry {

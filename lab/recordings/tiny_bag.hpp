@@ -75,7 +75,7 @@ struct KeptMessage {
   }
 };
 
-inline std::vector<KeptMessage> read_all(Rosbag1Reader& reader) {
+inline std::vector<KeptMessage> read_all(RecordingReader& reader) {
   std::vector<KeptMessage> all;
   while (const auto m = reader.next()) all.push_back({m->connection->id, m->time, {m->bytes.begin(), m->bytes.end()}});
   return all;

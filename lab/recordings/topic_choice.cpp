@@ -18,11 +18,13 @@ std::string accepted_text(Sensor sensor) {
   return text;
 }
 
-bool right_type(Sensor sensor, const BagConnection& connection) { return is_type_of(sensor, connection.type); }
+bool right_type(Sensor sensor, const Channel& connection) {
+  return connection.encoding != Encoding::other && is_type_of(sensor, connection.type);
+}
 
 /// Topics of the right type first, then by spelling.
-const BagConnection* nearest(const std::map<std::uint32_t, BagConnection>& connections, Sensor sensor, const std::string& pattern) {
-  const BagConnection* best = nullptr;
+const Channel* nearest(const std::map<std::uint32_t, Channel>& connections, Sensor sensor, const std::string& pattern) {
+  const Channel* best = nullptr;
   std::pair<bool, std::size_t> best_rank;
   for (const auto& [id, connection] : connections) {
     const std::pair rank{!right_type(sensor, connection), edit_distance(pattern, connection.topic)};
@@ -34,9 +36,9 @@ const BagConnection* nearest(const std::map<std::uint32_t, BagConnection>& conne
   return best;
 }
 
-[[noreturn]] void refuse_missing(const std::map<std::uint32_t, BagConnection>& connections, Sensor sensor, const std::string& pattern) {
+[[noreturn]] void refuse_missing(const std::map<std::uint32_t, Channel>& connections, Sensor sensor, const std::string& pattern) {
   std::string text = "no topic " + pattern + " for the sensor " + name_of(sensor);
-  const BagConnection* other = nearest(connections, sensor, pattern);
+  const Channel* other = nearest(connections, sensor, pattern);
   if (other == nullptr) throw InputError(text + ": the recording has no topics");
   text += "; the nearest is " + other->topic + " (" + other->type + ")";
   if (!right_type(sensor, *other)) text += ", but none is of type " + accepted_text(sensor);
@@ -52,9 +54,9 @@ bool topic_matches(Sensor sensor, const std::string& pattern, const std::string&
   return sensor == Sensor::camera && name.ends_with(suffix) && name.substr(0, name.size() - suffix.size()) == wanted;
 }
 
-ChosenTopic choose_topic(const std::map<std::uint32_t, BagConnection>& connections, Sensor sensor, const std::string& pattern) {
-  const BagConnection* chosen = nullptr;
-  const BagConnection* wrong = nullptr;
+ChosenTopic choose_topic(const std::map<std::uint32_t, Channel>& connections, Sensor sensor, const std::string& pattern) {
+  const Channel* chosen = nullptr;
+  const Channel* wrong = nullptr;
   for (const auto& [id, connection] : connections) {
     if (!topic_matches(sensor, pattern, connection.topic)) continue;
     if (!right_type(sensor, connection)) {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "kilvo/sensors/measurement.hpp"
-#include "lab/recordings/rosbag1_record.hpp"
+#include "lab/recordings/recording_reader.hpp"
 
 namespace kilvo::lab {
 
@@ -20,7 +20,7 @@ struct ChosenTopic {
 
 /// The topic to read for a sensor; the raw images where there are compressed ones too. Throws InputError: no such topic (names the
 /// nearest), or a topic of a type that the sensor cannot come as (names the type found and those accepted).
-ChosenTopic choose_topic(const std::map<std::uint32_t, BagConnection>& connections, Sensor sensor, const std::string& pattern);
+ChosenTopic choose_topic(const std::map<std::uint32_t, Channel>& connections, Sensor sensor, const std::string& pattern);
 
 /// Insertions, deletions and substitutions that turn one text into the other.
 std::size_t edit_distance(std::string_view a, std::string_view b);

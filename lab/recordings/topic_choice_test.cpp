@@ -7,7 +7,7 @@
 namespace kilvo::lab {
 namespace {
 
-using Connections = std::map<std::uint32_t, BagConnection>;
+using Connections = std::map<std::uint32_t, Channel>;
 
 Connections g1_topics() {
   return {{0, {0, "/livox/imu", "sensor_msgs/Imu", ""}},

@@ -39,9 +39,11 @@ TEST_F(BadInput, FilesThatAreNoRecording) {
   expect_refused(run(), 3, "recording.bag");
   write_text(recording(), "#ROSBAG V1.2\n");
   expect_refused(run(), 3, "recording.bag");
-  write_text(folder / "x.mcap", "\x89MCAP0\r\n");
-  expect_refused(kilvo({"run", folder / "x.mcap", "--config", config(), "--out", out()}), 3, "recognised, but not read yet");
   expect_refused(kilvo({"run", folder.path().string(), "--config", config(), "--out", out()}), 3, "recording.bag");
+  write_text(folder / "x.mcap", "\x89MCAP0\r\n");
+  expect_refused(kilvo({"run", folder / "x.mcap", "--config", config(), "--out", out()}), 3, "holds no messages");
+  write_text(folder / "x.db3", std::string("SQLite format 3\0 and no more", 29));
+  expect_refused(kilvo({"run", folder / "x.db3", "--config", config(), "--out", out()}), 3, "not a readable SQLite database");
 }
 
 TEST_F(BadInput, AnEmptyBag) {

@@ -1,4 +1,4 @@
-// The chunk compressions of ROS 1 bags.
+// The compressions of recordings.
 #pragma once
 
 #include <string>
@@ -17,8 +17,14 @@ struct Inflated {
   std::string fault;     // empty: all of the chunk
 };
 
-/// `compression` is "lz4" or "bz2"; `size` what the chunk claims to be when inflated: more is a fault. Input that only ends too early
-/// gives a good beginning; of input that fails its checksum nothing is good, since nobody knows where it went wrong.
+/// `compression` is "lz4", "bz2" or "zstd"; `size` what the chunk claims to be when inflated: more is a fault. Input that only ends too
+/// early gives a good beginning; of input that fails its checksum nothing is good, since nobody knows where it went wrong.
 Inflated inflate_chunk(std::string_view compression, Bytes compressed, std::size_t size);
+
+/// One or several zstd frames, up to `most` bytes; more is a fault.
+Inflated inflate_zstd(Bytes compressed, std::size_t most);
+
+/// Begins as a zstd frame does.
+bool is_zstd(Bytes bytes);
 
 }  // namespace kilvo::lab

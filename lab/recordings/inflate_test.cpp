@@ -1,4 +1,4 @@
-#include "lab/recordings/rosbag1_inflate.hpp"
+#include "lab/recordings/inflate.hpp"
 
 #include <bzlib.h>
 #include <gtest/gtest.h>
@@ -81,7 +81,7 @@ INSTANTIATE_TEST_SUITE_P(Compressions, InflateChunk, ::testing::Values("lz4", "b
 
 TEST(InflateAnything, RefusesWhatItDoesNotKnow) {
   const Data byte{1};
-  EXPECT_EQ(inflate_chunk("zstd", byte, 1).fault, "unknown compression zstd");
+  EXPECT_EQ(inflate_chunk("xz", byte, 1).fault, "unknown compression xz");
   EXPECT_EQ(inflate_chunk("lz4", {}, 1).fault, "has no data");
 }
 

@@ -1,9 +1,10 @@
-#include "lab/recordings/rosbag1_inflate.hpp"
+#include "lab/recordings/inflate.hpp"
 
 #include <algorithm>
 #include <bzlib.h>
 #include <lz4frame.h>
 #include <memory>
+#include <zstd.h>
 
 namespace kilvo::lab {
 namespace {
@@ -29,6 +30,7 @@ Inflated finished(std::vector<std::uint8_t> bytes, std::size_t filled, std::size
   return {std::move(bytes), filled, short_of ? "inflates to " + std::to_string(filled) + " bytes instead of " + std::to_string(size) : ""};
 }
 
+constexpr int zstd_window_log = 27;  // 128 MB, what zstd allows unasked
 constexpr std::size_t checksum_bytes = 4;
 constexpr std::size_t lz4_step = 1 << 16;
 
@@ -77,13 +79,48 @@ Inflated inflate_bz2(Bytes compressed, std::size_t size) {
   }
 }
 
+/// `exact`: less than `size` is a fault too.
+Inflated inflate_frames(Bytes compressed, std::size_t size, bool exact) {
+  const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
+  if (!context) return refused("zstd: no memory");
+  ZSTD_DCtx_setParameter(context.get(), ZSTD_d_windowLogMax, zstd_window_log);
+  std::vector<std::uint8_t> bytes;
+  ZSTD_inBuffer in{compressed.data(), compressed.size(), 0};
+  std::size_t out = 0;
+  while (true) {
+    if (out == bytes.size()) grow(bytes, compressed, size);
+    ZSTD_outBuffer to{bytes.data(), bytes.size(), out};
+    const std::size_t before = in.pos;
+    const std::size_t hint = ZSTD_decompressStream(context.get(), &to, &in);
+    if (ZSTD_isError(hint) != 0) return doubtful(std::move(bytes), out, std::string("zstd: ") + ZSTD_getErrorName(hint));
+    const bool stuck = to.pos == out && in.pos == before;
+    out = to.pos;
+    if (out > size) return doubtful(std::move(bytes), size, "zstd: more data than the chunk claims");
+    if (hint == 0 && in.pos == in.size) return finished(std::move(bytes), out, exact ? size : out);
+    if (!stuck) continue;
+    Inflated cut = finished(std::move(bytes), out, out);
+    cut.fault = "zstd: ends too early";
+    return cut;
+  }
+}
+
 }  // namespace
+
+bool is_zstd(Bytes bytes) { return bytes.size() >= 4 && bytes[0] == 0x28 && bytes[1] == 0xB5 && bytes[2] == 0x2F && bytes[3] == 0xFD; }
+
+Inflated inflate_zstd(Bytes compressed, std::size_t most) {
+  const unsigned long long claimed = ZSTD_getFrameContentSize(compressed.data(), compressed.size());
+  const bool known = claimed != ZSTD_CONTENTSIZE_UNKNOWN && claimed != ZSTD_CONTENTSIZE_ERROR;
+  if (known && claimed > most) return refused("claims to inflate to " + std::to_string(claimed) + " bytes");
+  return inflate_frames(compressed, known ? static_cast<std::size_t>(claimed) : most, known);
+}
 
 Inflated inflate_chunk(std::string_view compression, Bytes compressed, std::size_t size) {
   if (size > most_chunk_bytes) return refused("claims to inflate to " + std::to_string(size) + " bytes");
   if (compressed.empty()) return refused("has no data");
   if (compression == "lz4") return inflate_lz4(compressed, size);
   if (compression == "bz2") return inflate_bz2(compressed, size);
+  if (compression == "zstd") return inflate_frames(compressed, size, true);
   return refused("unknown compression " + std::string(compression.substr(0, 20)));
 }
 

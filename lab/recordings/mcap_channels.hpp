@@ -1,0 +1,27 @@
+// The channels of an MCAP file: what a topic's messages are of.
+#pragma once
+
+#include <map>
+
+#include "lab/recordings/mcap_record.hpp"
+
+namespace kilvo::lab {
+
+/// Channels and the schemas that they refer to, in any order.
+class McapChannels {
+ public:
+  void add(McapSchema schema);
+  void add(McapChannel channel);
+  void add(const McapChannels& others);
+  void add_schemas(const McapChannels& others);
+  Encoding encoding(std::uint16_t channel) const;
+  bool has(std::uint16_t channel) const { return channels_.contains(channel); }
+  std::map<std::uint32_t, Channel> all() const;
+  Channel channel(const McapChannel& channel) const;
+
+ private:
+  std::map<std::uint16_t, McapSchema> schemas_;
+  std::map<std::uint16_t, McapChannel> channels_;
+};
+
+}  // namespace kilvo::lab
