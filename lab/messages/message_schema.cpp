@@ -114,6 +114,14 @@ bool parse_line(std::string_view line, const std::string& package, SchemaType& t
   return true;
 }
 
+/// "[]", "[3]" or nothing.
+std::string length_of(const SchemaField& field) {
+  if (field.array == Array::none) return {};
+  std::string text = "[";
+  if (field.array == Array::fixed) text.append(std::to_string(field.length));
+  return text.append("]");
+}
+
 std::string package_of(std::string_view type) { return std::string(type.substr(0, type.find('/'))); }
 
 }  // namespace
@@ -175,10 +183,7 @@ std::string MessageSchema::text(Encoding encoding) const {
     if (&type != &types_.front()) out += line + "\nMSG: " + type.name + "\n";
     for (const std::string& constant : type.constants) out += constant + "\n";
     for (const SchemaField& field : type.fields) {
-      const std::string length = field.array == Array::none      ? ""
-                                 : field.array == Array::dynamic ? "[]"
-                                                                 : "[" + std::to_string(field.length) + "]";
-      out += name_in(field) + length + " " + field.name + "\n";
+      out += name_in(field) + length_of(field) + " " + field.name + "\n";
     }
   }
   if (any_header)
@@ -204,10 +209,7 @@ std::string MessageSchema::md5_of(std::size_t index) const {
       text += (field.kind == Kind::header ? std::string(header) : md5_of(field.type)) + " " + field.name + "\n";
       continue;
     }
-    const std::string length = field.array == Array::none      ? ""
-                               : field.array == Array::dynamic ? "[]"
-                                                               : "[" + std::to_string(field.length) + "]";
-    text += field.type_name + length + " " + field.name + "\n";
+    text += field.type_name + length_of(field) + " " + field.name + "\n";
   }
   if (!text.empty()) text.pop_back();
   std::array<char, MD5_DIGEST_STRING_LENGTH> sum{};
