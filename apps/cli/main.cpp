@@ -38,6 +38,7 @@ int parse_and_do(const std::vector<std::string>& words) {
   add_eval_contacts(program, chosen);
   add_report(program, chosen);
   add_config(program, chosen);
+  add_convert(program, chosen);
   add_simulate(program, chosen);
   add_demo(program, chosen);
   for (CLI::App* verb : program.get_subcommands({})) verb->group("Verbs");

@@ -19,6 +19,7 @@ void add_eval(CLI::App& program, Action& chosen);
 void add_compare(CLI::App& program, Action& chosen);
 void add_eval_contacts(CLI::App& program, Action& chosen);
 void add_report(CLI::App& program, Action& chosen);
+void add_convert(CLI::App& program, Action& chosen);
 void add_config(CLI::App& program, Action& chosen);
 void add_demo(CLI::App& program, Action& chosen);
 void add_simulate(CLI::App& program, Action& chosen);
