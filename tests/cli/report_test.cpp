@@ -107,6 +107,35 @@ TEST_F(Report, ContactsAreComparedWithTheTruth) {
   EXPECT_THAT(p.dom, HasSubstr("Touchdowns found: left 2 of 2, right 1 of 1."));
 }
 
+TEST_F(Report, PlaybackMovesTheCursorOfTime) {
+  const OpenedPage p = open_and_probe(page(), R"(
+const place = document.querySelector('#figure-map .place'), button = document.querySelector('#figure-map .play');
+place.value = 500; place.dispatchEvent(new Event('input'));
+const half = timeView.cursor;
+button.click();
+const playing = button.textContent;
+let frames = 0;
+const wait = () => ++frames < 5 ? requestAnimationFrame(wait) : probe({half, playing, later: timeView.cursor, reading: document.querySelector('#figure-map .reading').textContent});
+requestAnimationFrame(wait);
+)");
+  EXPECT_EQ(p.console, "");
+  ASSERT_TRUE(p.probed.is_object());
+  EXPECT_NEAR(p.probed["half"], 3.0, 0.1);
+  EXPECT_EQ(p.probed["playing"], "Pause");
+  EXPECT_GT(p.probed["later"], p.probed["half"]);
+  EXPECT_THAT(p.probed["reading"], HasSubstr(" s"));
+}
+
+TEST_F(Report, ARunThatDivergedHasARedLineOnTop) {
+  EXPECT_EQ(read_text(page()).find("the estimate diverged"), std::string::npos);
+  nlohmann::json summary = nlohmann::json::parse(read_text(results("summary.json")));
+  summary["diverged"] = true;
+  write_text(results("summary.json"), summary.dump());
+  ASSERT_EQ(report({"--gt", truth()}).code, 0);
+  const OpenedPage p = opened();
+  EXPECT_THAT(p.dom, AllOf(HasSubstr("class=\"distrust\""), HasSubstr("the estimate diverged")));
+}
+
 TEST_F(Report, APhoneShowsItWithoutScrollingSideways) {
   const OpenedPage p = open_narrow(page(), 390);
   EXPECT_EQ(p.console, "");
