@@ -11,7 +11,7 @@ struct Workers::Pool {
 };
 
 Workers::Workers(int threads) {
-  if (threads != 1) pool_ = std::make_unique<Pool>(threads > 0 ? threads : tbb::task_arena::automatic);
+  if (threads != 1) pool_ = std::make_unique<Pool>(threads > 0 ? threads : +tbb::task_arena::automatic);
 }
 
 Workers::~Workers() = default;
