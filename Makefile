@@ -2,6 +2,8 @@
 #   make build      the programs: build/release/bin/kilvo, and the nodes whose libraries are here
 #   make demo       simulate a humanoid that walks through a room, run on it, compare with the truth, show it
 #   make test       install the tests' packages, build and run every test
+#   make test-asan  build and run every test under the address and undefined-behaviour sanitizers, with Eigen's assertions
+#   make test-tsan  the tests with threads under the thread sanitizer
 #   make bench      time the functions; RECORDINGS=DIR: time and judge whole recordings as well
 #   make tables     RECORDINGS=DIR: every modality on every recording, as Markdown
 #   make check      layout, modules, sizes, headers, clang-tidy (files that changed since they last passed; ALL=1: every file)
@@ -10,7 +12,7 @@
 #   make install    into PREFIX=/usr/local
 #   make package    Debian packages in build/package
 #   make clean      remove build/
-.PHONY: build demo test bench tables check format fuzz install package clean dependencies-run dependencies dependencies-dev configure configure-program
+.PHONY: build demo test test-asan test-tsan bench tables check format fuzz install package clean dependencies-run dependencies dependencies-dev configure configure-program
 .NOTPARALLEL:
 .DEFAULT_GOAL := build
 
@@ -48,6 +50,16 @@ test: configure
 	@echo "compiling the programs, tests and benchmarks: about ten minutes on two cores"
 	cmake --build --preset release
 	ctest --preset release
+
+test-asan: dependencies
+	cmake --preset asan
+	cmake --build --preset asan
+	ctest --preset asan
+
+test-tsan: dependencies
+	cmake --preset tsan
+	cmake --build --preset tsan --target kilvo_live_test kilvo_live_walk_test kilvo_math_test
+	ctest --preset tsan -R '^(live|math)'
 
 bench: configure
 	cmake --build --preset release --target kilvo_bench_micro kilvo_cli

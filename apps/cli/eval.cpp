@@ -31,7 +31,10 @@ std::vector<lab::StampedPose> read_estimate(const std::string& path) {
 
 int evaluate_files(const EvalOptions& options) {
   const lab::Alignment alignment = alignment_or_refuse(options.align);
-  const lab::Evaluation result = lab::evaluate(read_estimate(options.estimate), lab::read_tum(options.truth), alignment);
+  const auto estimate = read_estimate(options.estimate), truth = lab::read_tum(options.truth);
+  lab::Evaluation result = lab::evaluate(estimate, truth, alignment);
+  // What a tilt of the world hides in the one shows in the other.
+  if (alignment != lab::Alignment::yaw) result.ate_rmse_yaw_m = lab::evaluate(estimate, truth, lab::Alignment::yaw).ate_rmse_m;
   fmt::print("{}", options.json ? lab::to_json(result) : lab::to_text(result));
   return done;
 }

@@ -19,6 +19,7 @@
 #include "apps/cli/summary.hpp"
 #include "apps/live/live_runner.hpp"
 #include "kilvo/estimator/estimator.hpp"
+#include "kilvo/estimator/levelling.hpp"
 #include "lab/mapping/ply.hpp"
 
 namespace kilvo::cli {
@@ -105,13 +106,18 @@ class Run {
     }
     input.stop();
     keep(estimator_.finish());
+    levelling_.finish();
+    write_waiting();
     return interrupted;
   }
 
   bool replay_live() {
     live::LiveRunner runner(estimator_, settings_.robot, settings_.estimator, as_flags(facts_.sensors), settings_.live,
-                            {[this](Output output) { files_.write_state(output); },
+                            {[this](Output output) {
+                               if (output.epoch == 0) files_.write_state(output);
+                             },
                              [this](Output output) {
+                               if (output.epoch > 0) return;
                                files_.write_sweep(output);
                                keep_map(output);
                              }});
@@ -146,9 +152,21 @@ class Run {
 
   void keep(std::vector<Output> outputs) {
     for (Output& output : outputs) {
+      if (output.epoch > 0) continue;  // of another recording: failure() says so
+      if (settings_.estimator.gravity_align) levelling_.add(output);
+      waiting_.push_back(std::move(output));
+    }
+    if (!settings_.estimator.gravity_align || levelling_.turn()) write_waiting();
+  }
+
+  // In the world as it is known to lie by then: nothing is written before.
+  void write_waiting() {
+    for (Output& output : waiting_) {
+      if (levelling_.turn()) Levelling::apply(*levelling_.turn(), output);
       files_.write(output);
       keep_map(output);
     }
+    waiting_.clear();
   }
 
   void keep_map(Output& output) {
@@ -171,8 +189,13 @@ class Run {
       const std::string why = estimator_.waiting_for();
       return "nothing was estimated: " + (why.empty() ? "no measurements" : "still " + why);
     }
+    if (estimator_.statistics().epochs > 1)
+      return "the recording's time goes back by more than 2 s: what follows is another recording, and is not in the results (--start and "
+             "--duration choose a part)";
     if (!run_summary.absurdity().empty()) return "diverged: " + run_summary.absurdity();
-    if (estimator_.statistics().diverged) return "diverged: the estimator lost itself";
+    for (const Event& event : estimator_.statistics().events) {
+      if (event.reason == Reason::diverged) return "diverged: " + event.detail;
+    }
     const bool legs_used = estimator_.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
     if (with_lidar && run_summary.sweeps() == 0 && !legs_used) return "no LiDAR scan could be used";
     return "";
@@ -200,6 +223,8 @@ class Run {
   MapKeeper map_;
   ResultFiles files_;
   SkeletonFile skeleton_;
+  Levelling levelling_;
+  std::vector<Output> waiting_;  // until the world is level
   Progress progress_;
   bool legs_seen_ = false;
   int foreign_legs_ = 0;

@@ -65,6 +65,10 @@ void LiveRunner::take(const Sample& sample) {
 void LiveRunner::take_over() {
   if (!forks_.fetch()) return;
   Fork& fork = forks_.front();
+  if (std::exchange(epoch_, fork.runner.epoch()) != fork.runner.epoch()) {
+    last_output_.reset();
+    newest_legs_ = Time::min();
+  }
   fast_raw_.catch_up(fork.runner);
   if (fork.corrected) statistics_.correction.add(seconds_since(*fork.corrected));
   // That there is no pose any more is reported once.

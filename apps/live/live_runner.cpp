@@ -152,7 +152,7 @@ void LiveRunner::answer(std::vector<Output>& outputs, Clock::time_point since) {
   const Modality modality = outputs.back().modality;
   const Time now = outputs.back().t;
   const bool corrected = pass_on(outputs);
-  const bool due = !last_fork_ || now - *last_fork_ >= fork_period || last_modality_ != modality;
+  const bool due = !last_fork_ || now < *last_fork_ || now - *last_fork_ >= fork_period || last_modality_ != modality;
   last_modality_ = modality;
   if (!corrected && !due) return;
   hand_over(corrected ? std::optional(since) : std::nullopt);

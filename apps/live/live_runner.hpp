@@ -128,6 +128,7 @@ class LiveRunner {
   RawSamples fast_raw_;
   std::uint64_t legs_heard_ = 0, legs_answered_ = 0;  // since the first output, while there is a pose
   Time newest_legs_ = Time::min();
+  std::uint32_t epoch_ = 0;
   std::optional<Time> last_output_;
   bool lost_ = false;
   // Of the slow thread:

@@ -14,6 +14,8 @@ class RawSamples {
  public:
   /// In the order of their arrival.
   void keep(const ImuSample& s) {
+    // The time went back: what was before is of another epoch.
+    if (!all_.empty() && newest_imu_ - s.t > longest_step) all_.clear();
     newest_imu_ = s.t;
     add(s);
   }
@@ -37,6 +39,7 @@ class RawSamples {
  private:
   using Raw = std::variant<ImuSample, Feet>;
   static constexpr std::size_t most = 8192;
+  static constexpr Duration longest_step = std::chrono::seconds(2);
   static constexpr Duration longest_lag = std::chrono::milliseconds(250);  // more is a wrong stamp, or of no use at all
   void add(const Raw& raw) {
     if (all_.size() >= most) all_.pop_front();

@@ -1,6 +1,7 @@
 #include "apps/ros1/map_thread.hpp"
 
 #include <ros/names.h>
+#include <utility>
 
 #include "apps/ros1/clouds.hpp"
 #include "lab/mapping/ply.hpp"
@@ -58,6 +59,8 @@ void MapThread::put(const Output& output) {
   if (output.is_sweep && cloud_.getNumSubscribers() > 0) cloud_.publish(cloud_message(output.points_W, output.t, frame_));
   if (!output.coloured.empty() && coloured_.getNumSubscribers() > 0) coloured_.publish(cloud_message(output.coloured, output.t, frame_));
   const std::lock_guard lock(map_mutex_);
+  // The map of another epoch is of another world.
+  if (std::exchange(epoch_, output.epoch) != output.epoch) map_ = lab::MapBuilder(config_);
   if (output.is_sweep) map_.add(output.points_W);
   if (!output.coloured.empty()) map_.colour(output.coloured);
 }

@@ -48,6 +48,7 @@ class MapThread {
   bool ended_ = false;
 
   std::mutex map_mutex_;
+  std::uint32_t epoch_ = 0;
   lab::MapBuilder map_;
   std::thread thread_;  // last: it uses all of the above
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <ros/names.h>
+#include <utility>
 
 namespace kilvo::ros1 {
 namespace {
@@ -62,6 +63,7 @@ StateOutlet::StateOutlet(const Parameters& parameters, const lab::Settings& sett
 }
 
 void StateOutlet::take(const Output& output) {
+  if (std::exchange(epoch_, output.epoch) != output.epoch) clear();
   const BodyMotion best = body_motion(output, T_IB_, rate_variance_);
   note(output, best);
   if (!best.is_finite()) return;

@@ -55,6 +55,7 @@ class StateOutlet {
   std::array<std::string, 2> feet_;
   ros::Publisher odometry_, smooth_odometry_, transforms_, contacts_, ground_, path_;
   SmoothOdometry smooth_;
+  std::uint32_t epoch_ = 0;
   std::optional<Time> last_tf_, last_ground_, last_path_;
 
   mutable std::mutex mutex_;

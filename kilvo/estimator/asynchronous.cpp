@@ -13,11 +13,15 @@ namespace {
 
 // Without sweeps nothing older than this will be replayed.
 constexpr Duration longest_replay = std::chrono::seconds(2);
+// No robot is hit so hard, and no IMU for robots measures it, m/s^2.
+constexpr double absurd_accel = 1000;
 
 }  // namespace
 
 void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   s.accel *= accel_scale_;
+  if (s.accel.norm() > absurd_accel) return drop(Sensor::imu, Reason::absurd_value);
+  note_clipping(s);
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::imu)].used;
   // Where the IMU was silent as well, nobody can say that the legs are lost.
   const Time heard = replay_.has_imu() ? replay_.newest_imu().t : s.t;
@@ -38,7 +42,7 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   replay_.close(closed_, *estimate_, s.t, &trajectory_);
   estimate_ = closed_;
   closing_us_ = last_legs_ ? closing_us_ + watch.lap_us() : 0;
-  keep_finite();
+  if (keep_finite()) good_ = closed_;
   if (s.t - anchor_.t > longest_replay && pending_.empty()) rebase(closed_);
   choose_modality(s.t);
   look_at_streams(s.t);
@@ -72,6 +76,7 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   if (const auto* fault = std::get_if<std::string>(&known)) return drop(Sensor::legs, Reason::wrong_joints, *fault);
   const Feet& feet = std::get<Feet>(known);
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::legs)].used;
+  leg_length_ = std::max(leg_length_, feet.foot[0].p[0].norm());
   if (last_legs_) leg_period_ = std::min(0.1, to_seconds(s.t - *last_legs_));
   last_legs_ = s.t;
 

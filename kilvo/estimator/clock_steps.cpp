@@ -11,6 +11,8 @@ namespace {
 constexpr Duration least_step = std::chrono::milliseconds(15);
 // So many samples in a row show that the time stays where it went; fewer, when so many messages of the others say so too.
 constexpr int witnesses = 10, few_witnesses = 3, votes = 3;
+// Beyond, the robot need not be where it was: nothing is remembered for so long.
+constexpr Duration longest_step = std::chrono::seconds(2);
 // Samples that follow each other are no farther apart.
 constexpr Duration longest_interval = std::chrono::milliseconds(100);
 // Legs that come as often are a clock.
@@ -30,6 +32,7 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
   const Time now = t + offset;
   const bool near = !imu_ || (now > *imu_ - least_step && now < *imu_ + longest_interval);
   const bool alone_ahead = imu_ && now > *imu_ + least_step && has_run_ahead(now);
+  if (!alone_ahead && is_alone(now)) return Reason::time_jump;
   if (near && !alone_ahead) {
     if (imu_ && now > *imu_) period_ = std::min(now - *imu_, period_ + period_ / 8);
     // The most of lately: less, when the IMU comes late.
@@ -58,6 +61,7 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
   // Nothing is missing: the first of them came one period after the newest before.
   const Duration period = (now - first_there_) / (there - 1);
   last_ = *imu_ + period - first_there_;
+  if (back && !alone && last_ > longest_step) return restart(t), std::nullopt;
   if (offset + last_ > largest_offset || offset + last_ < -largest_offset) return Reason::clock_back;
   ++count_;
   open_until_.fill(std::nullopt);
@@ -67,10 +71,31 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
   return std::nullopt;
 }
 
+void ClockSteps::restart(Time imu) {
+  ClockSteps fresh;
+  fresh.restarts_ = restarts_ + 1;
+  fresh.count_ = count_;
+  fresh.last_ = last_;
+  fresh.imu_ = imu;
+  *this = fresh;
+}
+
 // The others must have said whether they went back as well; when nobody else speaks, nobody is asked.
 bool ClockSteps::is_sure() const {
   const bool alone = std::ranges::none_of(lag_, [](const auto& lag) { return lag.has_value(); });
   return alone || for_ + against_ > 0 || newest_there_ - first_there_ > patience;
+}
+
+// One stamp of the IMU lies ahead, and nobody else's time has gone on so far: it is wrong, unless the next one goes on from there.
+bool ClockSteps::is_alone(Time now) {
+  const Duration usual = std::clamp(8 * period_, Duration(std::chrono::milliseconds(30)), longest_interval);
+  const bool goes_on = suspect_ && now > *suspect_ && now - *suspect_ < longest_interval;
+  if (!imu_ || now - *imu_ < usual || goes_on) return suspect_.reset(), false;
+  for (std::size_t s = 0; s < sensor_count; ++s) {
+    if (lag_[s] && newest_[s] && *newest_[s] + *lag_[s] - *imu_ > (now - *imu_) / 2) return suspect_.reset(), false;
+  }
+  suspect_ = now;
+  return true;
 }
 
 // The IMU's time has gone on by more than that of the legs. In a gap they go on as well.
@@ -118,6 +143,7 @@ std::optional<Reason> ClockSteps::follow(Measurement& m) {
     const Duration lag = *imu_ - (t + offset_[s]);
     constexpr double most = 0.05;  // s; one message that is late by hours is not to be followed
     lag_[s] = usual + from_seconds(std::clamp(to_seconds(lag) - to_seconds(usual), -most, most) / 10);
+    newest_[s] = std::max(newest_[s].value_or(t + offset_[s]), t + offset_[s]);
   } else if (imu_) {
     vote(s, t);
   }

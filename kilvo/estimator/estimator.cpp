@@ -18,6 +18,8 @@ constexpr Duration trajectory_length = std::chrono::milliseconds(500);
 constexpr std::size_t max_pending = 60;
 // theta_d: an acceleration so many standard deviations from its usual is an impact.
 constexpr double unusual_acceleration = 10;
+// What is thrown away took no less time than this, s.
+constexpr double least_gap = 0.02;
 // A walking machine that is faster than this, or so uncertain, has lost itself, m/s, m.
 constexpr double absurd_speed = 30, absurd_sigma = 1e4;
 
@@ -44,12 +46,13 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       visual_map_(config.visual_map),
       contacts_(config.legs),
       stances_(config.legs),
+      clipping_(robot.imu.gyro_range, robot.imu.accel_range),
       health_(robot),
       stationarity_(config.initial, unusual_acceleration) {
   if (!uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.leaf_size() * (1 + 1e-9))
     throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
-  if (uses(Sensor::legs)) kinematics_.emplace(robot, config.legs.contact == "force");
+  if (uses(Sensor::legs)) kinematics_ = std::make_unique<LegKinematics>(robot, config.legs.contact == "force");
   if (uses(Sensor::camera)) camera_.emplace(robot.camera);
   T_CI_ = robot.camera.T_imu_camera.inverse();
 }
@@ -70,6 +73,7 @@ void Estimator::push(Measurement m, std::vector<Output>& out) {
   if (!used_[static_cast<std::size_t>(s)]) return drop(s, Reason::not_used);
   const auto back = clock_steps_.follow(m);  // whatever it says, it has a time
   if (clock_steps_.count() > statistics_.clock_steps) note_clock_step();
+  if (clock_steps_.restarts() > epoch_) begin_new_epoch(out);
   if (const auto fault = fault_of(m)) return drop(s, *fault);
   if (back) return drop(s, *back);
   if (const auto fault = health_.judge(m)) return drop(s, *fault);
@@ -77,11 +81,33 @@ void Estimator::push(Measurement m, std::vector<Output>& out) {
   if (health_.imu_silence() > blind_gap) lose_imu(out);
   if (const auto refused = timeline_.push(std::move(m))) return drop(s, *refused);
   for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, Reason::time_jump);
+  for (const Sensor waited : timeline_.take_given_up()) drop(waited, Reason::no_imu);
   while (auto next = timeline_.pop()) handle(*next, out);
+}
+
+// The time went back: another recording, or the same again. What waited belongs to the time before; nothing else is kept.
+void Estimator::begin_new_epoch(std::vector<Output>& out) {
+  const double back = to_seconds(clock_steps_.last());
+  finish(out);
+  Estimator fresh(robot_, config_, used_);
+  fresh.epoch_ = epoch_ + 1;
+  fresh.clock_steps_ = clock_steps_;
+  fresh.statistics_ = std::move(statistics_);
+  fresh.statistics_.epochs = fresh.epoch_ + 1;
+  fresh.events_ = std::move(events_);
+  fresh.drops_ = drops_;
+  if (map_is_given_) fresh.give_map(std::move(map_));
+  *this = std::move(fresh);
+  report({}, Reason::began_anew, back);
 }
 
 std::vector<Output> Estimator::finish() {
   std::vector<Output> out;
+  finish(out);
+  return out;
+}
+
+void Estimator::finish(std::vector<Output>& out) {
   timeline_.end();
   ended_ = true;
   for (const Sensor jumped : timeline_.take_jumped()) drop(jumped, Reason::time_jump);
@@ -106,7 +132,6 @@ std::vector<Output> Estimator::finish() {
   before_start_.clear();
   report_streams();
   report_use({});
-  return out;
 }
 
 void Estimator::handle(Measurement& m, std::vector<Output>& out) {
@@ -160,7 +185,7 @@ void Estimator::bound_images_before_start() {
 
 void Estimator::begin(const Start& start, std::vector<Output>& out) {
   accel_scale_ = start.accel_scale;
-  estimate_ = anchor_ = closed_ = start.estimate;
+  estimate_ = anchor_ = closed_ = good_ = start.estimate;
   last_sweep_ = start.estimate.t;
   // Sweeps see for themselves how a robot settles while it stands.
   if (!uses(Sensor::lidar)) replay_.began_at_rest(start.rest_until);
@@ -189,15 +214,18 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
 
 bool Estimator::keep_finite(bool definite) {
   if (is_sane(*estimate_) && (!definite || is_definite(estimate_->P))) return true;
-  // Back to the last good state; where the robot went since, nobody knows.
-  const Time t = estimate_->t;
-  const double lost = to_seconds(t - anchor_.t);
-  anchor_.t = t;
-  anchor_.x.v.setZero();
-  anchor_.P.diagonal().segment<3>(at::v).array() += 1.0;
-  anchor_.P.diagonal().segment<6>(at::R).array() += 0.01;
+  // Back to the last good state. Where the robot went since, nobody knows: about as far as it was going.
+  const Time t = std::max(estimate_->t, good_.t);
+  const double lost = to_seconds(t - good_.t);
+  const double thrown = estimate_->x.v.allFinite() ? std::min(absurd_speed, (estimate_->x.v - good_.x.v).norm()) : absurd_speed;
+  good_.x.p += lost * good_.x.v;
+  inflate_covariance_over_gap(good_, good_.t, t, std::max(lost, least_gap));
+  good_.t = t;
+  // What made the velocity absurd may have begun before.
+  good_.P.diagonal().segment<3>(at::v).array() += thrown * thrown;
+  anchor_ = good_;
   for (std::size_t side = 0; side < 2; ++side) end_stance(anchor_, side);
-  estimate_ = closed_ = anchor_;
+  estimate_ = closed_ = good_ = anchor_;
   replay_.clear_steps();
   stances_.restart();
   contacts_.restart();
@@ -233,6 +261,7 @@ Output Estimator::output_now() {
     images_.pop_front();
   }
   o.t = estimate_->t;
+  o.epoch = epoch_;
   o.x = estimate_->x;
   o.P = estimate_->P;
   o.P.topLeftCorner<6, 6>() += map_error_.at(estimate_->x.pose());
@@ -253,8 +282,10 @@ bool Estimator::fork(LivePropagator& into) const {
   into.replay_.copy_since(closed_.t, replay_);
   into.contacts_ = contacts_;
   into.stances_ = stances_;
+  into.clipping_ = clipping_;
   into.last_legs_ = last_legs_;
   into.leg_period_ = leg_period_;
+  into.epoch_ = epoch_;
   into.modality_ = modality_;
   into.cause_ = cause_;
   into.map_error_ = map_error_.at(estimate_->x.pose());

@@ -3,10 +3,12 @@
 
 #include <array>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "kilvo/estimator/clipping.hpp"
 #include "kilvo/estimator/clock_steps.hpp"
 #include "kilvo/estimator/config.hpp"
 #include "kilvo/estimator/initialise.hpp"
@@ -63,6 +65,8 @@ class Estimator {
   const Health& health() const { return health_; }
   const VoxelMap& map() const { return map_; }
   bool initialised() const { return estimate_.has_value(); }
+  /// Of the outputs to come (Output::epoch).
+  std::uint32_t epoch() const { return epoch_; }
   /// What it waits for before the first output; empty afterwards.
   std::string waiting_for() const { return initialised() ? std::string() : initialiser_.waiting_for(); }
 
@@ -86,6 +90,8 @@ class Estimator {
   void emit(std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0, double contact_us = 0);
 
   void note_clock_step();
+  void begin_new_epoch(std::vector<Output>& out);
+  void finish(std::vector<Output>& out);
 
   // findings.cpp: what is reported beside the states
   struct Use {
@@ -98,8 +104,16 @@ class Estimator {
   void drop(Sensor sensor, Reason reason, const std::string& text = {});  // `text`: more exact than the reason's
   void change_modality(Modality modality, Reason cause);
   void look_at_streams(Time t);
+  void note_clipping(ImuSample& s);
   void report_streams();
   void report_use(const Use& before);
+
+  // agreement.cpp: whether what the senses say can be true together
+  void look_at_agreement(Time t);
+  void judge_speed();
+  void judge_biases();
+  Sensor witness_against(Sensor s) const;
+  void contradict(Reason reason, Sensor a, Sensor b, double value, const std::string& why);
 
   // asynchronous.cpp: IMU and legs
   void handle_imu(ImuSample s, std::vector<Output>& out);
@@ -126,8 +140,8 @@ class Estimator {
   bool waits_for_scan(Time image, Time until) const;
   void process(const LidarScan& scan, Time end, std::vector<Output>& out);
   bool has_no_shape(const Estimate& prior) const;
-  void learn(const LidarModel& model, const std::vector<PointCluster>& clusters);  // the map grows
-  void rebase(const Estimate& e);                                                  // nothing before it will be replayed
+  void learn(const LidarModel& model, const std::vector<PointCluster>& clusters, bool registered);  // the map grows
+  void rebase(const Estimate& e);                                                                   // nothing before it will be replayed
 
   // clocks.cpp: sensors whose stamps are off the IMU's
   void shift(Measurement& m) const;
@@ -159,10 +173,12 @@ class Estimator {
 
   std::optional<Estimate> estimate_;  // now: at the newest IMU or leg sample
   Estimate closed_;                   // at the newest IMU sample, all intervals before it with both their ends
+  Estimate good_;                     // the last closed_ that made sense
   Estimate anchor_;                   // after the last sweep, at the sweep's own time; what came since is replayed on it
   Replay replay_;                     // from the anchor on
   std::deque<Pending> pending_;       // by end
   bool ended_ = false;
+  std::uint32_t epoch_ = 0;
   std::deque<Output> sweeps_;  // results of sweeps, each to go out with one of the next leg samples
   std::deque<Output> images_;  // the same of images
   std::optional<Time> last_output_;
@@ -177,18 +193,21 @@ class Estimator {
   SE3 T_CI_;
   VisualMap visual_map_;
   MountCheck mount_check_;
-  bool mount_is_doubted_ = false, size_is_doubted_ = false;
+  bool size_is_doubted_ = false;
+  Time mount_doubted_until_{};
+  Duration mount_pause_{};
   int images_in_vain_ = 0;
   Time images_from_{};             // earlier ones are not used
   Time sweeps_from_{};             // earlier ones are used when the velocity is known
   std::vector<PointXYZI> seen_W_;  // points of the last sweep
 
-  std::optional<LegKinematics> kinematics_;
+  std::unique_ptr<LegKinematics> kinematics_;
   ContactDetector contacts_;
   StanceTracker stances_;
   std::optional<Time> last_legs_;  // while the legs are used
   double leg_period_ = 0;          // between the last two leg samples, s
   double closing_us_ = 0;          // what it took to close the IMU's intervals since the last leg sample
+  ClippingDetector clipping_;
   TimeOffset lidar_clock_;
   std::array<Duration, sensor_count> shift_{};              // found, and added to the stamps, by Sensor
   Time last_used_stance_{};                                 // when a foot was used last
@@ -207,7 +226,11 @@ class Estimator {
   EventLog events_;
   std::array<std::array<std::uint64_t, reason_count>, sensor_count> drops_{};  // by Sensor and Reason
   Use used_before_;
-  Time streams_looked_at_{}, use_looked_at_{};
+  Time streams_looked_at_{}, use_looked_at_{}, agreement_looked_at_{};
+  Eigen::Vector3d first_ba_ = Eigen::Vector3d::Zero(), first_bg_ = Eigen::Vector3d::Zero();
+  bool strange_biases_ = false;
+  std::uint64_t lost_stances_before_ = 0;
+  double leg_length_ = 1;  // m
 };
 
 }  // namespace kilvo

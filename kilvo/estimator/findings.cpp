@@ -50,12 +50,21 @@ void Estimator::look_at_streams(Time t) {
   if (t - streams_looked_at_ < streams_period) return;
   streams_looked_at_ = t;
   report_streams();
+  look_at_agreement(t);
   if (t - use_looked_at_ < use_period) return;
   use_looked_at_ = t;
   report_use(used_before_);
   for (std::size_t s = 0; s < sensor_count; ++s) used_before_.used[s] = statistics_.sensors[s].used;
   used_before_.dropped = drops_;
   used_before_.unsupported = statistics_.unsupported;
+}
+
+void Estimator::note_clipping(ImuSample& s) {
+  clipping_.mark(s);
+  if (!s.gyro_clipped && !s.accel_clipped) return;
+  const std::uint64_t count = health_.count_clipped();
+  const double value = s.gyro_clipped ? s.gyro.cwiseAbs().maxCoeff() : s.accel.cwiseAbs().maxCoeff();
+  events_.state({now(), Sensor::imu, s.gyro_clipped ? Reason::gyro_clipped : Reason::accel_clipped, value, count, {}});
 }
 
 // What the streams themselves showed.

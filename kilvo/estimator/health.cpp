@@ -35,15 +35,6 @@ std::uint64_t fingerprint(const void* data, std::size_t bytes) {
 
 }  // namespace
 
-bool is_clipped(const ImuSample& a, const ImuSample& b) {
-  constexpr double extreme_gyro = 8, extreme_accel = 25;  // rad/s, m/s^2
-  for (int i = 0; i < 3; ++i) {
-    if (a.gyro[i] == b.gyro[i] && std::abs(a.gyro[i]) > extreme_gyro) return true;
-    if (a.accel[i] == b.accel[i] && std::abs(a.accel[i]) > extreme_accel) return true;
-  }
-  return false;
-}
-
 Health::Health(const Robot& robot) : rates_{robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate} {}
 
 void Health::time(StreamHealth& stream, Tracker& tracker, Time t) {
@@ -184,7 +175,6 @@ std::optional<Reason> Health::judge(const Measurement& m) {
     return Reason::clock_ahead;
   }
   if (const auto* imu = std::get_if<ImuSample>(&m)) {
-    stream.clipped += is_clipped(imu_, *imu) ? 1 : 0;
     imu_ = *imu;
   }
   time(stream, tracker, t);

@@ -31,6 +31,9 @@ class Health {
   /// Looks at a message as it arrives. Says why it is not to be used; none when nothing speaks against it.
   std::optional<Reason> judge(const Measurement& m);
 
+  /// Of a sample at the end of the IMU's range; how many there were.
+  std::uint64_t count_clipped() { return ++streams_[static_cast<std::size_t>(Sensor::imu)].clipped; }
+
   const std::array<StreamHealth, sensor_count>& streams() const { return streams_; }
   /// The newest stamp of a sensor.
   std::optional<Time> heard(Sensor s) const { return trackers_[static_cast<std::size_t>(s)].stamp; }
@@ -66,8 +69,5 @@ class Health {
   Eigen::Vector3d gyro_mean_ = Eigen::Vector3d::Zero();
   double imu_silence_ = 0;
 };
-
-/// True when an axis of two samples in a row has the same value far from rest: the end of the sensor's range.
-bool is_clipped(const ImuSample& a, const ImuSample& b);
 
 }  // namespace kilvo

@@ -84,17 +84,6 @@ TEST(Health, SilenceOfTheImuIsCountedByTheOthersStampsAndNotByTheirAbsence) {
   EXPECT_NEAR(health.imu_silence(), 0.15, 1e-9);
 }
 
-TEST(Health, ClippedSamplesAreCounted) {
-  ImuSample a, b;
-  a.accel = {0, 0, 39.2};
-  b = a;
-  EXPECT_TRUE(is_clipped(a, b));
-  b.accel.z() = 39.1;
-  EXPECT_FALSE(is_clipped(a, b));
-  a.accel = b.accel = {0, 0, 9.8};
-  EXPECT_FALSE(is_clipped(a, b));
-}
-
 TEST(StationarityDetector, StandsAfterHalfASecondOfRestAndNotInMotion) {
   for (const bool moving : {false, true}) {
     StationarityDetector calm(InitialConfig{}, 10);

@@ -20,6 +20,12 @@ constexpr double new_scale = 0.4, new_angle = 0.25;
 // So many patches hold a pose by themselves.
 constexpr int enough = 20;
 
+// Fewer patches, or a smaller share of those that should be seen, do not carry an estimate.
+bool carries(const PhotometricModel::Report& report) {
+  constexpr int fewest = 10, one_in = 5;
+  return report.used >= fewest && one_in * report.used >= report.tracks - report.saturated;
+}
+
 bool is_new_view(const PatchCandidate& track) {
   const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(track.warp.A.determinant()))));
   return octaves > new_scale || track.view_angle > new_angle;
@@ -64,7 +70,7 @@ std::optional<SE3> Estimator::camera_from_state(Time image) const {
 }
 
 void Estimator::process(const CameraImage& image) {
-  if (mount_is_doubted_) return drop(Sensor::camera, Reason::mount_doubted);
+  if (image.t < mount_doubted_until_) return drop(Sensor::camera, Reason::mount_doubted);
   const std::optional<SE3> T_CI = camera_from_state(image.t);
   if (!T_CI) return drop(Sensor::camera, Reason::before_state);
   if (replay_.is_blind(image.t, image.t)) return drop(Sensor::camera, Reason::no_imu);
@@ -123,7 +129,7 @@ void Estimator::process(const CameraImage& image) {
   check_camera_clock();
   rebase(*estimate_);
   last_image_p_ = estimate_->x.p;
-  if (model.report().used > 0) last_image_ = image.t;
+  if (carries(model.report())) last_image_ = image.t;
   Output& seen = images_.emplace_back();
   seen.coloured = colours_of(image.image, estimate_->x.tau, *camera_, *T_CI * estimate_->x.pose().inverse(), depth);
   seen.indicators = indicators_of(model.report().used);
@@ -187,7 +193,12 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI, cons
   }
   const auto psi = mount_check_.misalignment();
   if (!psi) return;
-  mount_is_doubted_ = true;
+  // It is tried again, later each time: what fooled the check may have passed.
+  constexpr Duration first_pause = std::chrono::seconds(10), longest_pause = std::chrono::minutes(5);
+  mount_pause_ = mount_pause_ == Duration(0) ? first_pause : std::min(longest_pause, 2 * mount_pause_);
+  mount_doubted_until_ = estimate_->t + mount_pause_;
+  mount_check_ = MountCheck();
+  visual_map_ = VisualMap(config_.visual_map);
   const auto tenths = [](double value) { return decimals(value, 1); };
   const Eigen::Vector3d degrees = *psi * (180 / M_PI);
   report(Sensor::camera, Reason::camera_turned, degrees.norm(),
@@ -221,6 +232,8 @@ void Estimator::learn_from(const SE3& T_CI, const PhotometricModel& model, std::
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const PatchCandidate& track = tracks[i];
     const PhotometricModel::Verdict& verdict = model.verdicts()[i];
+    // Before a new view may take the place of the one that it was held against.
+    if (verdict.used || (verdict.looked && is_good)) visual_map_.judge(track.point, track.observation, verdict.used, verdict.correlation);
     if (verdict.used) {
       VisualPoint point = visual_map_.point(track.point);
       const SE3& first = visual_map_.frame(visual_map_.observation(point.observations[0]).frame).T_CW;
@@ -231,7 +244,6 @@ void Estimator::learn_from(const SE3& T_CI, const PhotometricModel& model, std::
         if (const auto seen = view(*pixel)) visual_map_.observe(track.point, *seen);
       }
     }
-    if (verdict.used || (verdict.looked && is_good)) visual_map_.judge(track.point, track.observation, verdict.used, verdict.correlation);
   }
   for (const NewPoint& found : new_points(map_, *camera_, T_CW, pyramid[0], depth, tracks, config_.vision)) {
     if (const auto seen = view(found.pixel)) visual_map_.insert(found.point, *seen);

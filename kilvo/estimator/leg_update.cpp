@@ -11,13 +11,15 @@ LegUpdate update_by_legs(const Feet& feet, Estimate& e, ContactDetector& contact
                          const VoxelMap* map, StanceTracker::Ground ground) {
   LegUpdate out;
   const State& x = e.x;
-  const Eigen::Vector3d omega = replay.newest_imu().gyro - x.bg;
+  // Of the feet's own time: a late leg sample is older than the newest of the IMU.
+  const ImuSample imu = replay.imu_at(feet.t);
+  const Eigen::Vector3d omega = imu.gyro - x.bg;
   const double sigma_v = std::sqrt(std::max(0.0, e.P.block<3, 3>(at::v, at::v).trace() / 3));
   Stopwatch watch;
-  contacts.update(feet, x, omega, replay.newest_imu().accel - x.ba, sigma_v, map);
+  contacts.update(feet, x, omega, imu.accel - x.ba, sigma_v, map);
   out.contact_us = watch.lap_us();
   out.step = stances.step(feet, contacts.contacts(), x, omega, sigma_v, map, ground);
-  contacts.adapt(out.step, x, replay.newest_imu().gyro, ground);
+  contacts.adapt(out.step, x, imu.gyro, ground);
   out.passed = replay.take(e, out.step);
   stances.judge(out.step, out.passed);
   return out;

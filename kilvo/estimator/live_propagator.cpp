@@ -12,7 +12,12 @@
 namespace kilvo {
 
 LivePropagator::LivePropagator(const Robot& robot, const EstimatorConfig& config)
-    : leg_rate_(robot.legs.rate), imu_rate_(robot.imu.rate), replay_(config), contacts_(config.legs), stances_(config.legs) {}
+    : leg_rate_(robot.legs.rate),
+      imu_rate_(robot.imu.rate),
+      replay_(config),
+      contacts_(config.legs),
+      stances_(config.legs),
+      clipping_(robot.imu.gyro_range, robot.imu.accel_range) {}
 
 // Both ends of the IMU's intervals up to the newest sample that is not after `until` are known now.
 void LivePropagator::close(Time until) {
@@ -46,6 +51,7 @@ bool LivePropagator::push(const ImuSample& raw) {
   if (raw.t <= newest || to_seconds(raw.t - newest) > blind_gap) return false;
   ImuSample s = raw;
   s.accel *= accel_scale_;
+  clipping_.mark(s);
   replay_.add(s);
   if (last_legs_ && s.t - *last_legs_ - lag_ > silence_of_legs(leg_rate_)) miss_legs();
   if (last_legs_ && !are_legs_overdue(s.t - *last_legs_ - lag_, leg_rate_, leg_period_)) return false;
@@ -81,6 +87,7 @@ Output LivePropagator::output() const {
   Estimate e = now_;
   if (imu_lost_) inflate_covariance_over_gap(e, e.t, e.t + from_seconds(blind_gap), blind_gap);
   o.t = e.t;
+  o.epoch = epoch_;
   o.x = e.x;
   o.P = e.P;
   o.P.topLeftCorner<6, 6>() += map_error_;

@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "kilvo/estimator/clipping.hpp"
 #include "kilvo/estimator/output.hpp"
 #include "kilvo/estimator/replay.hpp"
 #include "kilvo/legs/contact_detector.hpp"
@@ -29,6 +30,7 @@ class LivePropagator {
   /// Of the newest state; its time never goes back within one value, but may against another's.
   Output output() const;
 
+  std::uint32_t epoch() const { return epoch_; }
   bool started() const { return started_; }
   /// The IMU is silent: no pose until it is back.
   bool imu_lost() const { return imu_lost_; }
@@ -52,8 +54,10 @@ class LivePropagator {
   Replay replay_;    // from closed_ on
   ContactDetector contacts_;
   StanceTracker stances_;
+  ClippingDetector clipping_;
   std::optional<Time> last_legs_;  // while the legs are used
   double leg_period_ = 0;          // s
+  std::uint32_t epoch_ = 0;
   Modality modality_ = Modality::coast;
   Reason cause_ = Reason::start;
   PoseCovariance map_error_ = PoseCovariance::Zero();

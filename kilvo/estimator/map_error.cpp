@@ -48,6 +48,11 @@ PoseCovariance MapError::total(const SE3& T_WI, const PoseCovariance& P) const {
   return G * P * G.transpose() + now_;
 }
 
+void MapError::lost(const SE3& T_WI, const PoseCovariance& more) {
+  const PoseCovariance G = to_origin(T_WI);
+  now_ += G * more * G.transpose();
+}
+
 std::uint32_t MapError::epoch_now(const SE3& T_WI, const PoseCovariance& P) {
   const PoseCovariance total = P + at(T_WI);
   const PoseCovariance here = from_origin(T_WI);

@@ -30,6 +30,9 @@ class MapError {
   void registered_to_given(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic,
                            const PoseCovariance& weak);
 
+  /// The map begins anew at a pose that is wrong by so much more: nothing ties it to the one before.
+  void lost(const SE3& T_WI, const PoseCovariance& more);
+
   /// P + D as a twist at the world's origin.
   PoseCovariance total(const SE3& T_WI, const PoseCovariance& P) const;
 

@@ -30,6 +30,7 @@ struct StageTimes {
 
 struct Output {
   Time t{};
+  std::uint32_t epoch = 0;  // grows when the time went back and everything began anew: another world, another time
   State x;
   Covariance P = Covariance::Zero();                // of the error relative to the first pose (state.hpp: at)
   Eigen::Vector3d omega = Eigen::Vector3d::Zero();  // bias-free angular rate of the newest IMU sample, in the IMU frame, rad/s
@@ -68,6 +69,7 @@ struct Statistics {
   std::uint64_t clock_steps = 0;                   // the IMU's time stepped for good
   std::uint64_t searches = 0, found = 0;           // sweeps whose pose was searched for, and found
   std::uint64_t maps_begun_anew = 0;               // because sweeps had fitted nowhere for long
+  std::uint32_t epochs = 1;                        // times that everything began anew, and one
   bool diverged = false;
   std::vector<Event> events;  // one for each sensor and reason, as it was last
 };

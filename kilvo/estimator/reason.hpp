@@ -60,17 +60,22 @@ enum class Reason : std::uint8_t {
   pose_uncertain,
   agrees_with_nothing,
   // findings
+  began_anew,
   moving_start,
   strange_gravity,
   imu_clock_stepped,
   clock_offset,
   lagging,
   froze,
+  gyro_clipped,
+  accel_clipped,
   feet_not_still,
   map_begun_anew,
   state_thrown_away,
   foreign_images,
   camera_turned,
+  inconsistent,
+  diverged,
 };
 
 enum class Severity : std::uint8_t { notice, warning, error };
@@ -131,6 +136,8 @@ inline constexpr std::array reasons = {
     ReasonRow{Reason::mount_doubted, Severity::warning, "mount_doubted", "not mounted as configured"},
     ReasonRow{Reason::pose_uncertain, Severity::warning, "pose_uncertain", "the pose is too uncertain"},
     ReasonRow{Reason::agrees_with_nothing, Severity::warning, "agrees_with_nothing", "agrees with nothing"},
+    ReasonRow{Reason::began_anew, Severity::warning, "began_anew",
+              "the time went back by {} s: what follows is another recording, or the same again; everything begins anew", 1, 1},
     ReasonRow{Reason::moving_start, Severity::warning, "moving_start",
               "the robot did not stand still: started on the move, with wide uncertainties"},
     ReasonRow{Reason::strange_gravity, Severity::warning, "strange_gravity",
@@ -141,6 +148,8 @@ inline constexpr std::array reasons = {
               "its clock is {} ms behind the IMU's (negative: ahead), and is corrected from when that was seen: set []", 1e3, 1},
     ReasonRow{Reason::lagging, Severity::warning, "lagging", "its messages come {} ms after the IMU's of the same time", 1e3, 0},
     ReasonRow{Reason::froze, Severity::warning, "froze", "frozen: it kept saying the same"},
+    ReasonRow{Reason::gyro_clipped, Severity::warning, "gyro_clipped", "the gyroscope is at the end of its range, {} rad/s", 1, 1},
+    ReasonRow{Reason::accel_clipped, Severity::warning, "accel_clipped", "the accelerometer is at the end of its range, {} m/s^2", 1, 1},
     ReasonRow{Reason::feet_not_still, Severity::warning, "feet_not_still",
               "no foot seemed to stand still in {} % of the messages: is the mount of the IMU right, and the URDF this robot's?", 100, 0},
     ReasonRow{Reason::map_begun_anew, Severity::error, "map_begun_anew",
@@ -151,8 +160,10 @@ inline constexpr std::array reasons = {
     ReasonRow{
         Reason::camera_turned, Severity::warning, "camera_turned",
         "the images fit a camera that is turned by {} degrees or more ([] about the axes of the IMU) against camera.T_imu_camera.R: is "
-        "the calibration that of this robot, and camera.time_offset right? Images are not used any more",
+        "the calibration that of this robot, and camera.time_offset right? Images are left out for some time",
         1, 1},
+    ReasonRow{Reason::inconsistent, Severity::warning, "inconsistent", "[]"},
+    ReasonRow{Reason::diverged, Severity::error, "diverged", "[]"},
 };
 inline constexpr std::size_t reason_count = reasons.size();
 

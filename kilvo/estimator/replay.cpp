@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kilvo/estimator/health.hpp"
 #include "kilvo/estimator/recovery.hpp"
 #include "kilvo/filter/update.hpp"
 
@@ -52,11 +51,12 @@ void Replay::inflate_for_missed(ImuInterval& interval, double gap) const {
 }
 
 // Beyond the end of its range an IMU may have seen anything of the same size.
-void Replay::inflate_for_clipping(ImuInterval& interval) const {
+void Replay::inflate_for_clipping(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
   constexpr double gyro = 3, accel = 20;  // rad/s, m/s^2: what may be missing
   constexpr double correlation = 0.01;    // s: it stays missing for so long
-  interval.gyro_scale = gyro * gyro * correlation / (config_.noise.gyro * config_.noise.gyro);
-  interval.accel_scale = accel * accel * correlation / (config_.noise.accel * config_.noise.accel);
+  const auto scale = [](double missing, double noise) { return missing * missing * correlation / (noise * noise); };
+  if (a.gyro_clipped || b.gyro_clipped) interval.gyro_scale = scale(gyro, config_.noise.gyro);
+  if (a.accel_clipped || b.accel_clipped) interval.accel_scale = scale(accel, config_.noise.accel);
 }
 
 // No body turns or is pushed so much otherwise within one sample: one of the two is wrong, or hardly anything is known of what was between.
@@ -82,7 +82,7 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   ImuInterval interval = ImuInterval::between(a, b, begin, end);
   const double gap = to_seconds(b.t - a.t);
   if (gap <= config_.max_imu_gap) {
-    if (is_clipped(a, b)) inflate_for_clipping(interval);
+    inflate_for_clipping(interval, a, b);
     inflate_for_jump(interval, a, b);
     inflate_for_missed(interval, gap);
     return interval;
@@ -155,6 +155,18 @@ std::optional<Eigen::Vector3d> Replay::gyro_at(Time t) const {
   const ImuSample& a = *(next - 1);
   if (to_seconds(next->t - a.t) > config_.max_imu_gap) return std::nullopt;
   return a.gyro + (to_seconds(t - a.t) / to_seconds(next->t - a.t)) * (next->gyro - a.gyro);
+}
+
+ImuSample Replay::imu_at(Time t) const {
+  const auto next = std::lower_bound(imu_.begin(), imu_.end(), t, [](const ImuSample& s, Time value) { return s.t < value; });
+  if (next == imu_.end()) return imu_.back();
+  if (next == imu_.begin() || next->t == t) return *next;
+  const ImuSample& a = *(next - 1);
+  const double share = to_seconds(t - a.t) / to_seconds(next->t - a.t);
+  ImuSample out = a;
+  out.gyro += share * (next->gyro - a.gyro);
+  out.accel += share * (next->accel - a.accel);
+  return out;
 }
 
 LegModel::Used Replay::apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept) const {

@@ -30,6 +30,9 @@ class Replay {
   /// What the gyroscope said, rad/s; none within a gap.
   std::optional<Eigen::Vector3d> gyro_at(Time t) const;
 
+  /// What the IMU said at `t`: between two samples, or the last one held.
+  ImuSample imu_at(Time t) const;
+
   bool has_imu() const { return !imu_.empty(); }
   const ImuSample& newest_imu() const { return imu_.back(); }
   /// The stamp of the newest IMU sample that is not after t; before all times when there is none.
@@ -85,7 +88,7 @@ class Replay {
   LegModel::Used apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept = nullptr) const;
   bool retrace(Estimate& e, const Estimate& live, Time until, Trajectory* record) const;
   void inflate_for_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
-  void inflate_for_clipping(ImuInterval& interval) const;
+  void inflate_for_clipping(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
   void inflate_for_missed(ImuInterval& interval, double gap) const;
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
   FootOrientations standing_at(Time t) const;

@@ -9,9 +9,6 @@
 namespace kilvo {
 namespace {
 
-// A walking machine that is faster than this has lost itself.
-constexpr double absurd_speed = 30;  // m/s
-
 std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE3& T_WI) {
   std::vector<PointXYZI> out(points_I.size());
   const Eigen::Matrix3f R = T_WI.R.matrix().cast<float>();
@@ -40,11 +37,13 @@ void Estimator::rebase(const Estimate& e) {
 }
 
 // The map grows by what a sweep saw, and takes over how uncertain the pose was.
-void Estimator::learn(const LidarModel& model, const std::vector<PointCluster>& clusters) {
+void Estimator::learn(const LidarModel& model, const std::vector<PointCluster>& clusters, bool registered) {
   const SE3 T_WI = estimate_->x.pose();
-  map_error_.registered(T_WI, model.by_epoch(), unobservable_);
+  if (registered) map_error_.registered(T_WI, model.by_epoch(), unobservable_);
   const std::uint32_t epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
-  map_.insert(to_world(clusters, T_WI, robot_.lidar.T_imu_lidar.p, config_.lidar), epoch);
+  const std::vector<PointGroup> seen = to_world(clusters, T_WI, robot_.lidar.T_imu_lidar.p, config_.lidar);
+  map_.insert(seen, epoch);
+  map_.see_through(T_WI * robot_.lidar.T_imu_lidar.p, seen);
   map_.forget(estimate_->x.p);
 }
 
@@ -111,6 +110,9 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
     refuse_sweep(end);
     return replay_.advance(*estimate_, end, &trajectory_);
   }
+  // What holds less than three directions is no registration: it would carry the estimate while the modality says that legs do.
+  const bool enough = first || says_enough(model.report());
+  if (!enough) estimate_ = prior;
   const bool good = keep_finite(true);
   StageTimes stages;
   stages.lidar_us = watch.lap_us();
@@ -119,19 +121,19 @@ void Estimator::process(const LidarScan& scan, Time end, std::vector<Output>& ou
   if (good) {
     check_lidar_clock(prior, begin_of(scan), end);
     trajectory_.correct(centre, T_WI, estimate_->x.v - prior.x.v);
-    unobservable_ = weak_part(model.report().degeneracy);
-    if (!first) replay_.correlate_with_sweep(end, shared_with_sweep<at::R>(prior, *estimate_), shared_with_sweep<at::p>(prior, *estimate_));
+    unobservable_ = enough ? weak_part(model.report().degeneracy) : PoseCovariance::Identity();
+    if (!first && enough)
+      replay_.correlate_with_sweep(end, shared_with_sweep<at::R>(prior, *estimate_), shared_with_sweep<at::p>(prior, *estimate_));
     const bool sure = may_learn(prior, model.report());
-    if (map_is_given_) map_error_.registered_to_given(T_WI, model.by_epoch(), model.systematic(), unobservable_);
-    if (!map_is_given_ && sure) learn(model, clusters);
+    if (map_is_given_ && enough) map_error_.registered_to_given(T_WI, model.by_epoch(), model.systematic(), unobservable_);
+    if (!map_is_given_ && sure) learn(model, clusters, enough);
     rebase(*estimate_);
   }
   stages.map_us = watch.lap_us();
 
   replay_.advance(*estimate_, end, &trajectory_);
   ++statistics_.sensors[static_cast<std::size_t>(Sensor::lidar)].used;
-  statistics_.diverged = statistics_.diverged || estimate_->x.v.norm() > absurd_speed;
-  if (first || says_enough(model.report())) last_sweep_ = end;
+  if (enough) last_sweep_ = end;
   choose_modality(end);
   Output& sweep = sweeps_.emplace_back();
   sweep.is_sweep = true;

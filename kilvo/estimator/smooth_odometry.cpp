@@ -6,8 +6,9 @@
 namespace kilvo {
 namespace {
 
-// However large a correction is and however long nothing came, one output takes in no more, m, rad.
-constexpr double most_moved = 0.001, most_turned = 0.001;
+// However large a correction is, it moves the pose no faster, m/s, rad/s; and however long nothing came, one output takes in no more than
+// so many seconds of it.
+constexpr double most_moved = 1, most_turned = 1, longest = 0.2;
 
 Eigen::Vector3d at_most(const Eigen::Vector3d& v, double length) {
   const double n = v.norm();
@@ -26,8 +27,9 @@ SE3 SmoothOdometry::add(const Output& output) {
     pose_.p += 0.5 * dt * (v_ + x.v);
     pose_.R = pose_.R * SO3::Exp(0.5 * dt * (omega_ + output.omega));
     const double share = -std::expm1(-dt / time_);
-    pose_.p += at_most(share * (x.p - pose_.p), most_moved);
-    pose_.R = pose_.R * SO3::Exp(at_most(share * (pose_.R.inverse() * x.R).Log(), most_turned));
+    const double taken = std::min(dt, longest);
+    pose_.p += at_most(share * (x.p - pose_.p), taken * most_moved);
+    pose_.R = pose_.R * SO3::Exp(at_most(share * (pose_.R.inverse() * x.R).Log(), taken * most_turned));
   }
   t_ = output.t;
   v_ = x.v;

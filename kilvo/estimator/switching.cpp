@@ -201,10 +201,19 @@ void Estimator::refuse_sweep(Time t) {
   map_ = VoxelMap(config_.map);
   visual_map_ = VisualMap(config_.visual_map);
   unobservable_.setZero();
+  // It is farther away than a search would have looked, and nothing told how far.
+  constexpr double moved = 5.0, climbed = 1.0, turned = 0.5;  // m, m, rad
+  PoseCovariance unknown = PoseCovariance::Zero();
+  const Eigen::Vector3d up_I = estimate_->x.R.matrix().transpose() * -estimate_->x.g.normalized();
+  unknown.topLeftCorner<3, 3>() = turned * turned * up_I * up_I.transpose();
+  unknown.diagonal().tail<3>() << moved * moved, moved * moved, climbed * climbed;
+  map_error_.lost(estimate_->x.pose(), unknown);
   recovery_.refused_since.reset();
   recovery_.sweeps_to_go = 0;
   ++statistics_.maps_begun_anew;
   report(Sensor::lidar, Reason::map_begun_anew);
+  contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar), 2,
+             "for 2 s no sweep fitted the map where it should have been");
 }
 
 // After an outage the map is re-joined, not smeared: it grows again when sweeps have agreed with the prediction some times, or where it has

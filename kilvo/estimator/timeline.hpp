@@ -36,6 +36,10 @@ class Timeline {
   /// Sensors of the measurements that turned out to be ahead by mistake, since the last call.
   std::vector<Sensor> take_jumped() { return std::exchange(jumped_, {}); }
 
+  /// Sensors of the measurements that were given up since the last call, the oldest of each first: more of it waited than there is room
+  /// for, because the IMU is silent.
+  std::vector<Sensor> take_given_up() { return std::exchange(given_up_, {}); }
+
   /// The next measurement in order, if it need not wait.
   std::optional<Measurement> pop();
 
@@ -47,6 +51,8 @@ class Timeline {
   bool is_awaited(std::size_t s, Time key) const;
   void note_spacing(std::size_t s, Time key);
   void give_up_suspects();
+  void bound(std::size_t s);
+  void note_legs(Time key);
   std::optional<Reason> admit(Measurement m, Time key);
 
   std::array<bool, sensor_count> expected_;
@@ -59,9 +65,12 @@ class Timeline {
   Queue waiting_;
   std::vector<Queue::node_type> spare_;  // nodes of what has gone, to be used again: nothing is allocated at the rate of the legs
   std::vector<Measurement> suspects_;    // ahead of all others
-  std::vector<Sensor> jumped_;
+  std::vector<Sensor> jumped_, given_up_;
+  std::array<std::size_t, sensor_count> bytes_{};  // of what waits, by Sensor
   std::uint64_t sequence_ = 0;
   Duration max_wait_;
+  std::optional<Time> first_imu_;
+  Duration legs_lag_{};  // by which the legs' stamps trail the IMU's as they arrive, the most of lately
   bool wait_for_images_;
   bool ended_ = false;
 };

@@ -138,5 +138,75 @@ TEST(Timeline, ARecordingThatWasPausedGoesOnWithoutALoss) {
   EXPECT_TRUE(timeline.take_jumped().empty());
 }
 
+JointSample legs_at(double s) {
+  JointSample m;
+  m.t = time_from_ns(0) + from_seconds(s);
+  return m;
+}
+
+constexpr std::array<bool, sensor_count> imu_and_legs = {true, true, false, false};
+
+// How long an IMU sample has waited at the most between two times: what arrives is IMU at 200 Hz, and what `legs` says at 1 kHz.
+template <class Legs>
+double longest_wait(double from, double until, int& late, Legs&& legs) {
+  Timeline timeline(imu_and_legs, from_seconds(0.2));
+  double longest = 0;
+  for (int ms = 0; ms < 1000 * until; ++ms) {
+    const double s = 1e-3 * ms;
+    if (ms % 5 == 0) {
+      EXPECT_FALSE(timeline.push(imu_at(s)));
+    }
+    if (const std::optional<double> stamp = legs(s)) late += timeline.push(legs_at(*stamp)) ? 1 : 0;
+    while (auto m = timeline.pop()) {
+      if (s > from && std::holds_alternative<ImuSample>(*m)) longest = std::max(longest, s - to_seconds(stamp_of(*m).time_since_epoch()));
+    }
+  }
+  return longest;
+}
+
+TEST(Timeline, LegsThatAreLostOrWereNeverThereKeepNobodyWaiting) {
+  int late = 0;
+  EXPECT_LT(longest_wait(2, 4, late, [](double) { return std::optional<double>(); }), 0.006) << "never there";
+  EXPECT_LT(longest_wait(2.2, 4, late, [](double s) { return s < 2 ? std::optional(s) : std::nullopt; }), 0.006) << "lost at 2 s";
+  EXPECT_EQ(late, 0);
+}
+
+TEST(Timeline, LegsThatComeLateOrAgainAreWaitedFor) {
+  int late = 0;
+  longest_wait(0, 4, late, [](double s) { return s > 0.15 ? std::optional(s - 0.15) : std::nullopt; });
+  EXPECT_EQ(late, 0) << "always 150 ms late";
+  longest_wait(0, 6, late, [](double s) { return s < 2 || s > 4 ? std::optional(s - 0.02) : std::nullopt; });
+  EXPECT_LE(late, 2) << "away for 2 s";
+}
+
+TEST(Timeline, WithoutTheImuNoSensorFillsTheMemory) {
+  constexpr std::size_t megabyte = std::size_t{1} << 20;
+  Timeline timeline({true, false, true, true}, from_seconds(0.2));
+  EXPECT_FALSE(timeline.push(imu_at(0)));
+  std::size_t waiting = 0, most = 0, scans = 0, given_up = 0;
+  for (int i = 0; i < 400; ++i) {
+    CameraImage image;
+    image.t = time_from_ns(0) + from_seconds(0.01 + 0.05 * i);
+    image.image.pixels.resize(2 * megabyte);
+    EXPECT_FALSE(timeline.push(std::move(image)));
+    if (i % 2 == 0) {
+      EXPECT_FALSE(timeline.push(scan_from(0.05 * i, 0.1)));
+    }
+    scans += i % 2 == 0 ? 1 : 0;
+    ++waiting;
+    for (const Sensor s : timeline.take_given_up()) {
+      waiting -= s == Sensor::camera ? 1 : 0;
+      scans -= s == Sensor::lidar ? 1 : 0;
+      ++given_up;
+    }
+    while (timeline.pop()) {
+    }
+    most = std::max(most, waiting);
+  }
+  EXPECT_LE(most, 33u) << "of 2 MB each";
+  EXPECT_LE(scans, 32u) << "of 3 s";
+  EXPECT_GT(given_up, 400u);
+}
+
 }  // namespace
 }  // namespace kilvo

@@ -25,6 +25,14 @@ void Moments::add(const PointGroup& g, const Eigen::Vector3d& origin) {
   nzz_ += n(2, 2);
 }
 
+Moments& Moments::operator+=(const Moments& o) {
+  count_ += o.count_;
+  sum_ += o.sum_;
+  xx_ += o.xx_, xy_ += o.xy_, xz_ += o.xz_, yy_ += o.yy_, yz_ += o.yz_, zz_ += o.zz_;
+  nxx_ += o.nxx_, nxy_ += o.nxy_, nxz_ += o.nxz_, nyy_ += o.nyy_, nyz_ += o.nyz_, nzz_ += o.nzz_;
+  return *this;
+}
+
 Eigen::Matrix3d Moments::covariance() const {
   const Eigen::Vector3d m = mean();
   Eigen::Matrix3d C;

@@ -20,6 +20,8 @@ struct PointGroup {
 class Moments {
  public:
   void add(const PointGroup& group, const Eigen::Vector3d& origin);
+  /// Those of the same origin.
+  Moments& operator+=(const Moments& other);
   double count() const { return count_; }
   Eigen::Vector3d mean() const { return sum_ / count_; }  // relative to the origin
   Eigen::Matrix3d covariance() const;                     // of the points, not of their mean

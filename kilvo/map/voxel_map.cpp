@@ -168,6 +168,8 @@ void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32
   for (int level = 0;; ++level) {
     Node& node = nodes_[index];
     const bool settled = is_settled(node);
+    if (node.against > 0 && node.is_plane && explains(node.plane, group)) node.against = 0;
+    if (node.moments.count() == 0) node.epoch = epoch;
     if (settled && explains(node.plane, group)) return;
     if (!settled) {
       node.moments.add(group, origin);
@@ -187,15 +189,17 @@ void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32
   }
 }
 
-void VoxelMap::free_tree(std::uint32_t index) {
-  Node& node = nodes_[index];
-  if (node.children != none) {
-    for (const std::uint32_t child : children_[node.children]) {
-      if (child != none) free_tree(child);
-    }
-    children_.give_back(node.children);
-    node.children = none;
+void VoxelMap::free_children(Node& node) {
+  if (node.children == none) return;
+  for (const std::uint32_t child : children_[node.children]) {
+    if (child != none) free_tree(child);
   }
+  children_.give_back(node.children);
+  node.children = none;
+}
+
+void VoxelMap::free_tree(std::uint32_t index) {
+  free_children(nodes_[index]);
   nodes_.give_back(index);
   --node_count_;
 }

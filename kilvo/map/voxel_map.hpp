@@ -61,6 +61,10 @@ class VoxelMap {
   /// begin now are marked with `epoch`: the caller's name for the pose error that they share.
   void insert(std::span<const PointGroup> groups, std::uint32_t epoch);
 
+  /// The beams from `origin_W` to the means of `groups` (of some of them, others each time) met nothing on their way: a plane that beams
+  /// keep passing through, and that no group is found on meanwhile, is not there any more and is forgotten with its points.
+  void see_through(const Eigen::Vector3d& origin_W, std::span<const PointGroup> groups);
+
   /// Forgets voxels beyond the radius around `centre`, and the farthest ones while there are more than max_nodes.
   void forget(const Eigen::Vector3d& centre);
 
@@ -88,6 +92,7 @@ class VoxelMap {
     bool is_plane = false;
     std::uint32_t epoch = 0;
     std::uint32_t children = none;  // index of its table of eight; none for leaves and undivided nodes
+    float against = 0;              // beams that passed through the plane since points were found on it
     double fitted_count = 0;        // points at the last fit
     Moments moments;
   };
@@ -122,6 +127,12 @@ class VoxelMap {
   bool is_settled(const Node& node) const { return node.is_plane && node.moments.count() >= config_.full_points; }
   static bool explains(const Plane& plane, const PointGroup& group);
   void refit_if_due(Node& node, const Eigen::Vector3d& origin);
+  // The nodes from a root voxel down to one of them.
+  using Path = std::array<std::uint32_t, depth + 1>;
+  void trace(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+  bool is_passed(std::uint32_t root, const Leaf& leaf, const Eigen::Vector3d& from, const Eigen::Vector3d& to, std::uint32_t& last);
+  void forget_plane(const Path& path, int level, const Eigen::Vector3d& origin);
+  void free_children(Node& node);
   void erase_root(VoxelKey key);
   void free_tree(std::uint32_t node);
 
@@ -132,6 +143,7 @@ class VoxelMap {
   Pool<Node> nodes_;
   Pool<Children> children_;
   std::size_t node_count_ = 0;
+  std::size_t beams_of_ = 0;  // see_through() calls, by which its beams rotate
   Eigen::Vector3d last_forget_ = Eigen::Vector3d::Zero();
 };
 

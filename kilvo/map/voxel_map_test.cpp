@@ -225,5 +225,71 @@ TEST(VoxelMap, PointsThatAreNowhereAreLeftOut) {
   EXPECT_EQ(map.node_count(), 0U);
 }
 
+// A LiDAR at the origin looks at a wall 6 m away; a box stands in between for 3 s, at ten sweeps a second.
+struct SeenThrough {
+  VoxelMap map{MapConfig{}};
+
+  void sweep(const std::vector<Eigen::Vector3d>& points) {
+    const std::vector<PointGroup> groups = test::groups_of(points, leaf, sigma);
+    map.insert(groups, 1);
+    map.see_through(Eigen::Vector3d::Zero(), groups);
+  }
+  // What a beam meets first.
+  static std::vector<Eigen::Vector3d> scene(bool with_box) {
+    std::vector<Eigen::Vector3d> out;
+    for (double y = -3; y < 3; y += spacing) {
+      for (double z = -1; z < 2; z += spacing) {
+        // A hole in the wall, through which the next one is seen.
+        const bool hole = std::abs(y - 1.6) < 0.5 && std::abs(z - 0.4) < 0.5;
+        const Eigen::Vector3d wall = hole ? Eigen::Vector3d(9, 1.5 * y, 1.5 * z) : Eigen::Vector3d(6, y, z);
+        const double t = 3.1 / wall.x();
+        const bool box = with_box && std::abs(t * y) < 0.4 && std::abs(t * z) < 0.4;
+        out.push_back(box ? Eigen::Vector3d(t * wall) : wall);
+      }
+    }
+    return out;
+  }
+  int planes_of_box() const {
+    int count = 0;
+    for (double y = -0.35; y < 0.4; y += 0.1) {
+      for (double z = -0.35; z < 0.4; z += 0.1) count += map.plane_at({3.1, y, z}) != nullptr ? 1 : 0;
+    }
+    return count;
+  }
+};
+
+TEST(VoxelMap, ABoxThatIsGoneIsForgottenAfterTwoSecondsOfBeamsThroughIt) {
+  SeenThrough seen;
+  for (int i = 0; i < 30; ++i) seen.sweep(SeenThrough::scene(true));
+  EXPECT_GT(seen.planes_of_box(), 40);
+  for (int i = 0; i < 20; ++i) seen.sweep(SeenThrough::scene(false));
+  EXPECT_EQ(seen.planes_of_box(), 0);
+  EXPECT_NE(seen.map.plane_at({6, 0.3, 0.3}), nullptr);
+}
+
+TEST(VoxelMap, AWallAroundAHoleStays) {
+  SeenThrough seen;
+  for (int i = 0; i < 100; ++i) seen.sweep(SeenThrough::scene(false));
+  int there = 0, all = 0;
+  for (double y = -2.9; y < 2.9; y += 0.1) {
+    for (double z = -0.9; z < 1.9; z += 0.1) {
+      if (std::abs(y - 1.6) < 0.6 && std::abs(z - 0.4) < 0.6) continue;
+      ++all;
+      there += seen.map.plane_at({6, y, z}) != nullptr ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(there, all);
+}
+
+TEST(VoxelMap, AFloorUnderGrazingBeamsStays) {
+  VoxelMap map{MapConfig{}};
+  const auto groups = test::groups_of(test::points_on({-5, -5, -1}, 10 * x_axis, 10 * y_axis, 0.1), leaf, sigma);
+  for (int i = 0; i < 50; ++i) {
+    map.insert(groups, 1);
+    map.see_through({0, 0, 0}, groups);
+  }
+  for (double x = -4.9; x < 5; x += 0.5) EXPECT_NE(map.plane_at({x, 0.5 * x, -1}), nullptr) << x;
+}
+
 }  // namespace
 }  // namespace kilvo

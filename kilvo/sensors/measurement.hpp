@@ -15,8 +15,9 @@ namespace kilvo {
 /// Angular rate and specific force in the IMU frame. The acceleration may be in g: the estimator detects it at rest.
 struct ImuSample {
   Time t{};
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   // rad/s
-  Eigen::Vector3d accel = Eigen::Vector3d::Zero();  // m/s^2 (or g)
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();    // rad/s
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();   // m/s^2 (or g)
+  bool gyro_clipped = false, accel_clipped = false;  // at the end of the sensor's range; found by the estimator
 };
 
 /// Joint encoders (or the two-feet message, whose six positions and velocities come without names).

@@ -16,9 +16,10 @@ struct Evaluation {
   std::size_t estimates = 0;  // poses in the estimate
   std::size_t matches = 0;    // of these, compared with the truth
 
-  double ate_rmse_m = 0;         // absolute trajectory error: position, after alignment
-  double ate_max_m = 0;          //
-  double rotation_rmse_deg = 0;  // angle of R_G^T R_GE R_E
+  double ate_rmse_m = 0;                 // absolute trajectory error: position, after alignment
+  double ate_max_m = 0;                  //
+  std::optional<double> ate_rmse_yaw_m;  // aligned by position and heading, where that was asked for beside another alignment
+  double rotation_rmse_deg = 0;          // angle of R_G^T R_GE R_E
 
   // Relative error (T_G,i^-1 T_G,j)^-1 (T_E,i^-1 T_E,j): rms of its translation. Nothing when the walk is shorter, or the poses too rare.
   std::optional<double> rte_1m_m;        // j is 1 m of the truth's path after i

@@ -26,6 +26,7 @@ std::string to_json(const Evaluation& e) {
   json["matches"] = e.matches;
   json["ate_rmse_m"] = e.ate_rmse_m;
   json["ate_max_m"] = e.ate_max_m;
+  if (e.ate_rmse_yaw_m) json["ate_rmse_yaw_m"] = *e.ate_rmse_yaw_m;
   json["rotation_rmse_deg"] = e.rotation_rmse_deg;
   json["rte_1m_m"] = or_null(e.rte_1m_m);
   json["rte_1m_percent"] = or_null(e.rte_1m_percent);
@@ -51,6 +52,7 @@ std::string to_text(const Evaluation& e) {
   row("compared", fmt::format("{} of {} estimates, {:.1f} % of {:.1f} s, path {:.2f} m, aligned by {}", e.matches, e.estimates,
                               100.0 * e.coverage, e.duration_s, e.path_length_m, name_of(e.alignment)));
   row("ATE", fmt::format("rmse {}, max {}", length(e.ate_rmse_m), length(e.ate_max_m)));
+  if (e.ate_rmse_yaw_m) row("ATE, yaw", fmt::format("rmse {}, aligned by position and heading", length(*e.ate_rmse_yaw_m)));
   row("rotation", fmt::format("rmse {:.3f} deg", e.rotation_rmse_deg));
   row("RTE over 1 m", length(e.rte_1m_m) + (e.rte_1m_percent ? fmt::format(" ({:.3f} %)", *e.rte_1m_percent) : ""));
   row("RTE over 1 s", length(e.rte_1s_m));

@@ -46,12 +46,17 @@ float from_upper_half(std::uint16_t half) { return std::bit_cast<float>(static_c
 
 }  // namespace
 
-MapBuilder::MapBuilder(const MappingConfig& config) : resolution_(config.resolution), tables_(table_count) {
+MapBuilder::MapBuilder(const MappingConfig& config)
+    : resolution_(config.resolution),
+      keep_(config.keep),
+      max_points_(static_cast<std::size_t>(std::max(0, config.max_points))),
+      tables_(table_count) {
   if (!(std::isfinite(resolution_) && resolution_ > 0)) throw std::invalid_argument("map.resolution must be a positive length in metres");
   for (Table& table : tables_) grow(table);
 }
 
 void MapBuilder::add(std::span<const Eigen::Vector4f> points_W) {
+  if (!keep_) return;
   std::array<Voxel, block_size> samples;
   std::array<std::uint64_t, block_size> hashes;
   for (std::size_t begin = 0; begin < points_W.size(); begin += block_size) {
@@ -105,6 +110,10 @@ void MapBuilder::merge(const Voxel& sample, std::uint64_t hashed) {
     const float share = 1.0F / static_cast<float>(known.count);
     for (int axis = 0; axis < 3; ++axis) known.position[axis] = moved(known.position[axis], sample.position[axis], share);
     known.intensity += share * (sample.intensity - known.intensity);
+    return;
+  }
+  if (size_ >= max_points_) {
+    ++left_out_;
     return;
   }
   append(sample);

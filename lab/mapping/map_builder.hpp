@@ -18,10 +18,15 @@ namespace kilvo::lab {
 
 struct MappingConfig {
   double resolution = 0.05;  // m
+  bool keep = true;
+  int max_points = 20000000;
 
   static constexpr auto fields() {
     return std::tuple{
-        Field{"resolution", &MappingConfig::resolution, "m", "edge of the voxels of which the saved map keeps one point each"}};
+        Field{"resolution", &MappingConfig::resolution, "m", "edge of the voxels of which the saved map keeps one point each"},
+        Field{"keep", &MappingConfig::keep, "-", "whether a map is kept to be saved at all"},
+        Field{"max_points", &MappingConfig::max_points, "-",
+              "points of the saved map at most (about 42 bytes each); what is seen beyond them is left out"}};
   }
 };
 
@@ -51,6 +56,8 @@ class MapBuilder {
   std::optional<std::array<std::uint8_t, 3>> colour_of(std::size_t i) const;
   /// How many points have a colour.
   std::size_t coloured() const { return coloured_; }
+  /// How many of the points given to add() were left out because the map was full.
+  std::uint64_t left_out() const { return left_out_; }
   /// How many of the points given to add() were not usable.
   std::uint64_t dropped() const { return dropped_; }
   /// What the map occupies.
@@ -88,9 +95,11 @@ class MapBuilder {
   Colour& colour_at(std::size_t i);
 
   double resolution_;
+  bool keep_;
+  std::size_t max_points_;
   std::size_t size_ = 0;
   std::size_t coloured_ = 0;
-  std::uint64_t dropped_ = 0;
+  std::uint64_t dropped_ = 0, left_out_ = 0;
   std::vector<std::unique_ptr<Voxel[]>> chunks_;    // never moved
   std::vector<std::unique_ptr<Colour[]>> colours_;  // of the chunks; null, or missing, where nothing has a colour
   std::vector<Table> tables_;                       // many small ones, grown one at a time

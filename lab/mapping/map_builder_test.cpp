@@ -273,5 +273,20 @@ TEST(MapColours, CostEightBytesPerPointAndNothingWithoutImages) {
   EXPECT_LE(map.memory_bytes() / map.size(), 24u + 16u + 8u);
 }
 
+TEST(MapBuilder, KeepsNoMoreThanItMayAndNothingWhenItIsSwitchedOff) {
+  MappingConfig small;
+  small.max_points = 100;
+  MapBuilder map(small);
+  std::vector<Eigen::Vector4f> line;
+  for (int i = 0; i < 250; ++i) line.emplace_back(0.1F * static_cast<float>(i), 0, 0, 1);
+  map.add(line);
+  EXPECT_EQ(map.size(), 100u);
+  EXPECT_EQ(map.left_out(), 150u);
+  small.keep = false;
+  MapBuilder none(small);
+  none.add(line);
+  EXPECT_EQ(none.size(), 0u);
+}
+
 }  // namespace
 }  // namespace kilvo::lab

@@ -20,6 +20,8 @@ constexpr Range above_zero(double high = any) { return {0, high, true}; }
 constexpr std::pair<std::string_view, Range> ranges[] = {
     {"imu.rate", above_zero(100000)},
     {"imu.time_offset", {-10, 10}},
+    {"imu.accel_range", up_to(10000)},
+    {"imu.gyro_range", up_to(1000)},
     {"imu.gyro_noise", above_zero()},
     {"imu.accel_noise", above_zero()},
     {"imu.velocity_noise", up_to(any)},
@@ -80,6 +82,7 @@ constexpr std::pair<std::string_view, Range> ranges[] = {
     {"map.radius", above_zero(10000)},
     {"map.max_nodes", {1000, 100000000}},
     {"map.resolution", {0.001, 100}},
+    {"map.max_points", {0, 1000000000}},
     {"map.visual.voxel_size", {0.05, 100}},
     {"map.visual.points_per_voxel", {1, 1000}},
     {"map.visual.max_points", {1, 10000000}},

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -86,11 +87,19 @@ struct Outcome {
   }
 };
 
+/// What else may be different in a run.
+struct Changes {
+  std::optional<std::array<bool, sensor_count>> used = {};
+  std::function<bool(Measurement&, double s)> edit = {};  // `s`: of arrival; false: it does not arrive
+  std::function<void(Robot&)> robot = {};
+};
+
 class FailingWalk {
  public:
-  FailingWalk(const std::string& name, std::uint64_t seed, double seconds, bool camera = false) {
+  FailingWalk(const std::string& name, std::uint64_t seed, double seconds, bool camera = false, double accel_range = 160) {
     lab::SimulatorConfig config = small(seconds);
     config.seed = seed;
+    config.imu.accel_range = accel_range;
     config.lidar.points = 4000;
     config.joints.delivery.rate = 500;
     config.camera.width = 160;
@@ -118,6 +127,23 @@ class FailingWalk {
     while (auto m = source.next()) take(*std::move(m));
   }
 
+  /// The walk, and then the same again: the worst errors in both, each in its own world, m; and when they began, s.
+  std::vector<std::pair<double, double>> twice() const {
+    Estimator estimator(settings_.robot, settings_.estimator, used_);
+    std::vector<std::vector<Output>> epochs;
+    const auto take = [&epochs](std::vector<Output> outputs) {
+      for (Output& o : outputs) {
+        epochs.resize(std::max<std::size_t>(epochs.size(), o.epoch + 1));
+        epochs[o.epoch].push_back(std::move(o));
+      }
+    };
+    for (int round = 0; round < 2; ++round) play({}, [&](Measurement m) { take(estimator.push(std::move(m))); });
+    take(estimator.finish());
+    std::vector<std::pair<double, double>> out;
+    for (const auto& outputs : epochs) out.emplace_back(worst_error(outputs), simulator_->seconds_of(outputs.front().t));
+    return out;
+  }
+
   /// Of the positions, in the truth's world, m.
   double worst_error(const std::vector<Output>& outputs) const {
     double out = 0;
@@ -130,8 +156,10 @@ class FailingWalk {
     return out;
   }
 
-  Outcome with(std::vector<lab::Failure> failures, std::optional<std::array<bool, sensor_count>> used = {}) const {
-    Estimator estimator(settings_.robot, settings_.estimator, used.value_or(used_));
+  Outcome with(std::vector<lab::Failure> failures, const Changes& changes = {}) const {
+    Robot robot = settings_.robot;
+    if (changes.robot) changes.robot(robot);
+    Estimator estimator(robot, settings_.estimator, changes.used.value_or(used_));
     Outcome out;
     std::optional<SE3> T_WR;
     std::optional<Time> last;
@@ -151,7 +179,9 @@ class FailingWalk {
         out.moments.push_back(std::move(m));
       }
     };
-    play(std::move(failures), [&](Measurement m) { take(estimator.push(std::move(m))); });
+    play(std::move(failures), [&](Measurement m) {
+      if (!changes.edit || changes.edit(m, simulator_->seconds_of(stamp_of(m)))) take(estimator.push(std::move(m)));
+    });
     take(estimator.finish());
     out.statistics = estimator.statistics();
     return out;

@@ -1,4 +1,5 @@
 // Random failures of any sensors at any times, one upon another. KILVO_SCHEDULES=300 kilvo_faults_test --gtest_filter=Schedules.*
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <gtest/gtest.h>
@@ -60,9 +61,13 @@ TEST(Schedules, OfRandomFailuresAreOutlived) {
     EXPECT_TRUE(o.finite && o.ordered) << n << words(failures);
     ASSERT_FALSE(o.moments.empty());
     const test::Moment& last = o.moments.back();
-    const bool good = last.error < 0.5 && last.sigmas < 4;
+    // Of every output: where the estimate is wrong it says so. One in a thousand is a matter of luck.
+    const auto lies = std::ranges::count_if(o.moments, [](const test::Moment& m) { return m.s > 1 && m.sigmas > 6; });
+    const bool good = last.error < 0.5 && last.sigmas < 4 && 1000 * lies < std::ssize(o.moments);
     bad += good ? 0 : 1;
-    EXPECT_TRUE(good) << "schedule " << n << ": " << last.error << " m, " << last.sigmas << " sigmas:" << words(failures);
+    EXPECT_TRUE(good) << "schedule " << n << ": " << last.error << " m, " << last.sigmas << " sigmas at the end, " << lies << " of "
+                      << o.moments.size() << " outputs beyond six sigmas (" << o.worst(&test::Moment::sigmas, 1, seconds)
+                      << "):" << words(failures);
   }
   std::printf("%d of %d schedules good\n", count - bad, count);
 }

@@ -47,7 +47,7 @@ std::unique_ptr<FailingWalk> Faults::walk_;
 TEST_F(Faults, NothingWrongIsNothingSaid) {
   const Outcome o = with({});
   say("nothing", o, 0, 20);
-  EXPECT_LT(o.worst(&Moment::error, 0, 20), 0.03);
+  EXPECT_LT(o.worst(&Moment::error, 0, 20), 0.006);
   EXPECT_EQ(o.statistics.imu_outages, 0u);
   EXPECT_EQ(o.statistics.searches, 0u);
   for (const StreamHealth& h : o.statistics.health) {
@@ -65,7 +65,7 @@ TEST_F(Faults, AnImuThatIsSilentInMidWalkIsSaidAndOutlived) {
     EXPECT_TRUE(o.has_cause(Reason::imu_lost));
     EXPECT_TRUE(o.has_cause(Reason::imu_back));
     EXPECT_LT(o.worst(&Moment::sigmas, 5, 14), 4.0);
-    EXPECT_LT(o.moments.back().error, 0.05);
+    EXPECT_LT(o.moments.back().error, 0.006);
     for (const Moment& m : o.moments) EXPECT_FALSE(m.s > 6.11 && m.s < 6 + length) << m.s;
   }
 }
@@ -82,29 +82,29 @@ TEST_F(Faults, AllButTheImuLostForTwoSeconds) {
   EXPECT_EQ(o.modality_at(7), Modality::coast);
   EXPECT_EQ(o.modality_at(9), Modality::kil);
   EXPECT_LT(o.worst(&Moment::sigmas, 5, 14), 3.5);
-  EXPECT_LT(o.worst(&Moment::error, 9, 14), 0.03);
+  EXPECT_LT(o.worst(&Moment::error, 9, 14), 0.009);
 }
 
 TEST_F(Faults, OneSensorLostForSixSeconds) {
   const Outcome legs = with({{FailureKind::drop, Sensor::legs, 6, 12}});
   say("legs 6 s", legs, 6, 14);
   EXPECT_THAT(legs.changes(), testing::ElementsAre("KIL", "LI", "KIL"));
-  EXPECT_LT(legs.worst(&Moment::error, 6, 14), 0.03);
+  EXPECT_LT(legs.worst(&Moment::error, 6, 14), 0.009);
   const Outcome lidar = with({{FailureKind::drop, Sensor::lidar, 6, 12}});
   say("lidar 6 s", lidar, 6, 14);
   EXPECT_THAT(lidar.changes(), testing::ElementsAre("KIL", "KI", "KIL"));
-  EXPECT_LT(lidar.worst(&Moment::error, 6, 14), 0.06);
+  EXPECT_LT(lidar.worst(&Moment::error, 6, 14), 0.036);
 }
 
 TEST_F(Faults, FrozenSensorsAreLost) {
   const Outcome legs = with({{FailureKind::freeze, Sensor::legs, 6, 8}});
   say("legs frozen", legs, 6, 14);
   EXPECT_TRUE(legs.has_cause(Reason::legs_frozen));
-  EXPECT_LT(legs.worst(&Moment::error, 6, 14), 0.03);
+  EXPECT_LT(legs.worst(&Moment::error, 6, 14), 0.006);
   const Outcome lidar = with({{FailureKind::freeze, Sensor::lidar, 6, 8}});
   say("lidar frozen", lidar, 6, 14);
   EXPECT_TRUE(lidar.has_cause(Reason::lidar_frozen));
-  EXPECT_LT(lidar.worst(&Moment::error, 6, 14), 0.05);
+  EXPECT_LT(lidar.worst(&Moment::error, 6, 14), 0.012);
   const Outcome imu = with({{FailureKind::freeze, Sensor::imu, 6, 7}});
   say("imu frozen", imu, 6, 14);
   EXPECT_TRUE(imu.has_cause(Reason::imu_frozen));
@@ -121,7 +121,7 @@ TEST_F(Faults, OneWrongSampleOfTheImuIsOutlived) {
 }
 
 TEST_F(Faults, ClocksThatGoBackTogetherAreFollowed) {
-  for (const double step : {-1.0, -3600.0}) {
+  for (const double step : {-0.5, -1.0}) {
     const auto all = [step](Sensor s) { return Failure{FailureKind::time_jump, s, 6, for_ever, step}; };
     const Outcome o = with({all(Sensor::imu), all(Sensor::legs), all(Sensor::lidar)});
     say("clocks back", o, 6, 14);
@@ -129,7 +129,7 @@ TEST_F(Faults, ClocksThatGoBackTogetherAreFollowed) {
     EXPECT_EQ(o.statistics.clock_steps, 1u);
     EXPECT_THAT(warnings_of(o.statistics), testing::Contains(testing::HasSubstr("clock went back")));
     // The outputs go on in the time that they began with, which is the truth's.
-    EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.03);
+    EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.006);
   }
 }
 
@@ -159,7 +159,7 @@ TEST_F(Faults, SweepsThatContradictTheMapAreRefused) {
   ASSERT_TRUE(dropped.contains("fits nowhere in the map"));
   EXPECT_GE(dropped.at("fits nowhere in the map"), 5u);
   EXPECT_EQ(o.statistics.maps_begun_anew, 0u);
-  EXPECT_LT(o.worst(&Moment::error, 6, 14), 0.05);
+  EXPECT_LT(o.worst(&Moment::error, 6, 14), 0.006);
 }
 
 TEST_F(Faults, AClockAheadOfTheImuIsMeasuredAndItsSensorNotUsed) {
@@ -169,7 +169,7 @@ TEST_F(Faults, AClockAheadOfTheImuIsMeasuredAndItsSensorNotUsed) {
     const StreamHealth& h = o.statistics.health[static_cast<std::size_t>(sensor)];
     EXPECT_GT(h.off_clock, 50u);
     EXPECT_NEAR(h.clock_offset, 0.3, 0.02);
-    EXPECT_LT(o.worst(&Moment::error, 6, 14), 0.05);
+    EXPECT_LT(o.worst(&Moment::error, 6, 14), 0.039);
     EXPECT_THAT(warnings_of(o.statistics), testing::Contains(testing::HasSubstr("ms ahead of the IMU")));
   }
 }
@@ -178,7 +178,7 @@ TEST_F(Faults, AnImuThatComesLateIsNoFaultOfTheOthers) {
   const Outcome o = with({{FailureKind::delay, Sensor::imu, 0, for_ever, 0.3}});
   say("imu delayed", o, 0, 14);
   EXPECT_EQ(o.modality_at(12), Modality::kil);
-  EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.05);
+  EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.006);
 }
 
 // KILVO_SEEDS=20 kilvo_faults_test --gtest_filter=Coasting.*
@@ -193,7 +193,7 @@ TEST(Clocks, ALidarsOffsetIsFoundAndMended) {
                 1e3 * o.rms_error(), 1e3 * error, 1e3 * o.moments.back().error);
     EXPECT_NEAR(found, -offset, 0.002);
     EXPECT_THAT(warnings_of(o.statistics), testing::Contains(testing::HasSubstr("set lidar.time_offset to")));
-    EXPECT_LT(o.rms_error(), 0.02);
+    EXPECT_LT(o.rms_error(), 0.011);
   }
 }
 
@@ -234,7 +234,7 @@ TEST(Standing, WithTheImuAloneItStays) {
   const Outcome o = walk.with({{FailureKind::drop, Sensor::lidar, 5, 15}, {FailureKind::drop, Sensor::legs, 5, 15}});
   std::printf("10 s of the IMU alone: worst error %.4f m, %.1f sigmas\n", o.worst(&Moment::error, 0, 16), o.worst(&Moment::sigmas, 0, 16));
   EXPECT_EQ(o.modality_at(10), Modality::coast);
-  EXPECT_LT(o.worst(&Moment::error, 0, 16), 0.05);
+  EXPECT_LT(o.worst(&Moment::error, 0, 16), 0.007);
   EXPECT_LT(o.worst(&Moment::sigmas, 0, 16), 4.0);
 }
 
@@ -246,7 +246,7 @@ TEST_F(Faults, ASensorThatComesLateOrNever) {
       const Modality without = sensor == Sensor::legs ? Modality::li : Modality::ki;
       EXPECT_EQ(o.modality_at(4), without);
       EXPECT_EQ(o.modality_at(13), end > 10 ? without : Modality::kil);
-      EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.1);
+      EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.039);
     }
   }
 }

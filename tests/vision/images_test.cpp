@@ -1,5 +1,6 @@
 // What images do for the estimate of a walking humanoid, and what bad ones must not do.
 #include <algorithm>
+#include <cstdio>
 #include <functional>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -181,6 +182,21 @@ TEST_F(Images, ACameraTurnedByThreeDegreesIsSpokenOf) {
   for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)}) {
     const Drive d = drive(liv, {}, [&](Robot& r) { r.camera.T_imu_camera.R = SO3::Exp(3 * M_PI / 180 * axis) * r.camera.T_imu_camera.R; });
     EXPECT_THAT(warnings_of(d.statistics), testing::Contains(HasSubstr("camera.T_imu_camera.R"))) << axis.transpose();
+  }
+}
+
+// What is used must be worth the name: a camera that is described wrongly carries nothing.
+TEST_F(Images, OfAWronglyDescribedCameraCarryNothing) {
+  const std::vector<std::pair<const char*, std::function<void(Robot&)>>> wrong = {
+      {"cx and cy swapped", [](Robot& r) { std::swap(r.camera.cx, r.camera.cy); }},
+      {"fx halved", [](Robot& r) { r.camera.fx /= 2; }},
+      {"mount inverted", [](Robot& r) { r.camera.T_imu_camera = r.camera.T_imu_camera.inverse(); }}};
+  for (const auto& [what, mount] : wrong) {
+    const Drive d = drive(liv, {}, mount);
+    const auto liv_outputs = d.outputs.contains(Modality::liv) ? d.outputs.at(Modality::liv) : 0;
+    std::printf("%s: LIV in %d of %d outputs, error %.2f mm\n", what, liv_outputs, liv_outputs + d.outputs.at(Modality::li), 1e3 * d.error);
+    EXPECT_LT(liv_outputs, 0.3 * d.outputs.at(Modality::li)) << what;
+    EXPECT_LT(d.error, 0.01) << what;
   }
 }
 

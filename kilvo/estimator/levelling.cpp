@@ -1,0 +1,47 @@
+#include "kilvo/estimator/levelling.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kilvo {
+namespace {
+
+// Known well enough, rad; whoever waits for it does not wait for ever.
+constexpr double known = 1e-3;
+constexpr Duration longest = std::chrono::seconds(12);
+
+}  // namespace
+
+void Levelling::add(const Output& o) {
+  if (R_LW_) return;
+  g_ = o.x.g;
+  sigma_ = std::sqrt(std::max(0.0, o.P.diagonal().segment<3>(at::g).maxCoeff())) / std::max(1.0, g_.norm());
+  if (!first_) {
+    first_ = o.t;
+    first_sigma_ = sigma_;
+  }
+  if (sigma_ < known || o.t - *first_ > longest) finish();
+}
+
+void Levelling::finish() {
+  if (R_LW_ || !first_) return;
+  R_LW_ = SO3();
+  if (!(sigma_ < 0.5 * first_sigma_) || !(g_.z() < 0)) return;
+  const Eigen::Vector3d up = -g_.normalized();
+  R_LW_ = SO3::nearest(Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix());
+}
+
+void Levelling::apply(const SO3& R_LW, Output& o) {
+  const Eigen::Matrix3d& R = R_LW.matrix();
+  o.x.R = R_LW * o.x.R;
+  for (Eigen::Vector3d* v : {&o.x.p, &o.x.v, &o.x.g, &o.x.pc[0], &o.x.pc[1]}) *v = R * *v;
+  for (const int block : {at::v, at::p, at::g, at::pcl, at::pcr}) {
+    o.P.middleRows<3>(block) = (R * o.P.middleRows<3>(block)).eval();
+    o.P.middleCols<3>(block) = (o.P.middleCols<3>(block) * R.transpose()).eval();
+  }
+  const Eigen::Matrix3f Rf = R.cast<float>();
+  for (PointXYZI& x : o.points_W) x.head<3>() = (Rf * x.head<3>()).eval();
+  for (ColouredPoint& point : o.coloured) point.p_W = (Rf * point.p_W).eval();
+}
+
+}  // namespace kilvo
