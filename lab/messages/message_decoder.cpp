@@ -30,7 +30,9 @@ Decoded<DecodedMeasurement> timed(Decoded<DecodedScan> decoded) {
 Decoded<DecodedMeasurement> part(Sensor sensor, Decoded<UnitreeSample> decoded) {
   if (!decoded) return DecodeError{decoded.reason()};
   auto measurement = sensor == Sensor::imu ? plain<ImuSample>(decoded->imu) : plain(std::move(decoded->joints));
-  if (measurement) measurement->tick = decoded->tick;
+  if (!measurement) return measurement;
+  measurement->tick = decoded->tick;
+  if (sensor == Sensor::legs) measurement->gyro = decoded->imu.gyro;
   return measurement;
 }
 

@@ -21,6 +21,7 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
   }
   ++counts_.used;
   tick_ = decoded->tick;
+  gyro_ = decoded->gyro;
   counts_.absurd_point_times += decoded->absurd_times;
   Time& stamp = stamp_in(decoded->measurement);
   if (stamp == Time{}) {

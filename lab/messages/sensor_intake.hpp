@@ -30,11 +30,19 @@ class SensorIntake {
   /// `type` is a plain_type_name() that is_type_of() the sensor.
   std::optional<Measurement> take(Sensor sensor, std::string_view type, const WireMessage& message, Time arrived,
                                   const PointTimeFormat& point_time);
+  /// The message that was taken last is not used after all.
+  void take_back(const std::string& cause) {
+    --counts_.used;
+    ++counts_.dropped[cause];
+  }
   /// A message was too large to be looked at.
   void refuse_too_large() { ++counts_.dropped["too_large"]; }
 
   /// The counter that the last message that was taken has in place of a stamp (ms, wraps around); nothing when it has none.
   const std::optional<std::uint32_t>& tick() const { return tick_; }
+
+  /// The rate of the gyroscope that the last message held beside its joints, rad/s; nothing when it held none.
+  const std::optional<Eigen::Vector3d>& gyro() const { return gyro_; }
 
   const SensorCounts& counts() const { return counts_; }
   /// Why the first undecodable message was; empty without one.
@@ -45,6 +53,7 @@ class SensorIntake {
   SensorCounts counts_;
   std::string first_fault_;
   std::optional<std::uint32_t> tick_;
+  std::optional<Eigen::Vector3d> gyro_;
 };
 
 }  // namespace kilvo::lab

@@ -58,8 +58,15 @@ RecordingSource::RecordingSource(const std::vector<std::filesystem::path>& input
 
 std::optional<Measurement> RecordingSource::decode(Sensor sensor, const RawMessage& message) {
   SensorIntake& intake = intakes_[static_cast<std::size_t>(sensor)];
-  if (message.size <= most_message_bytes) return intake.take(sensor, message.connection->type, message.wire(), message.time, point_time_);
-  intake.refuse_too_large();
+  if (message.size > most_message_bytes) {
+    intake.refuse_too_large();
+    return std::nullopt;
+  }
+  auto measurement = intake.take(sensor, message.connection->type, message.wire(), message.time, point_time_);
+  if (!measurement || !options_.leg_clock) return measurement;
+  const char* why = options_.leg_clock->follow(*measurement, message.time, {intake.tick(), intake.gyro()});
+  if (why == nullptr) return measurement;
+  intake.take_back(why);
   return std::nullopt;
 }
 
@@ -109,6 +116,11 @@ std::vector<std::string> RecordingSource::warnings() const {
     if (counts.absurd_point_times > 0) {
       texts.push_back(topic + ": " + plural(counts.absurd_point_times, "point") + " dropped, whose time is not within 2 s of the stamp");
     }
+  }
+  if (options_.leg_clock) {
+    const auto& clock = *options_.leg_clock;
+    const auto text = clock.offset() ? std::to_string(1e3 * *clock.offset()) + " ms to the times of arrival" : std::string("not found");
+    texts.push_back("legs: clock by comparison with the IMU: " + text + "; " + plural(clock.withheld(), "sample") + " before that not used");
   }
   if (!point_time_.usual_span) texts.push_back(topic(Sensor::lidar) + ": point times in " + point_time_.text());
   if (reader_->late_messages() > 0) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "kilvo/calibration/leg_clock.hpp"
 #include "kilvo/sensors/measurement_source.hpp"
 #include "lab/messages/point_time.hpp"
 #include "lab/messages/sensor_intake.hpp"
@@ -30,6 +31,8 @@ struct RecordingOptions {
   bool no_deskew = false;                                     // take every cloud at its stamp; needs no point times
   double start = 0;                                           // s from the beginning of the recording
   double duration = std::numeric_limits<double>::infinity();  // s
+
+  std::optional<LegClock> leg_clock;                          // puts the leg samples onto the IMU's clock
 
   SensorInput& operator[](Sensor s) { return sensors[static_cast<std::size_t>(s)]; }
   const SensorInput& operator[](Sensor s) const { return sensors[static_cast<std::size_t>(s)]; }

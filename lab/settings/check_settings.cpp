@@ -74,6 +74,7 @@ void check_names(const Settings& s, Problems& problems) {
   };
   for (const Foot& foot : s.robot.feet) check("robot.feet", foot.link, names.links, "link");
   check("imu.T_link_imu.link", s.robot.imu.link, names.links, "link");
+  check("legs.gyro_link", s.leg_clock.gyro_link, names.links, "link");
   for (const std::string& joint : s.robot.locked_joints) check("robot.locked_joints", joint, names.joints, "joint");
 }
 
@@ -111,6 +112,10 @@ void check_settings(const Settings& settings) {
   }
   if (problems.none()) check_together(settings, problems);
   problems.collect([&] { check_names(settings, problems); });
+  problems.collect([&] {
+    if (settings.leg_clock.clock == "estimated" && settings.robot.legs.type == "feet")
+      refuse(settings, "legs.clock", "estimated needs joints: two feet have no angular rate");
+  });
   problems.report();
 }
 

@@ -47,6 +47,7 @@ constexpr std::pair<std::string_view, Range> ranges[] = {
     {"live.priority", {-1, 99}},
     {"live.fast_core", {-1, 1023}},
     {"live.slow_core", {-1, 1023}},
+    {"live.tf_rate", {1, 1000}},
     {"legs.foot_noise", up_to(10)},
     {"legs.foot_noise_vertical", up_to(10)},
     {"lidar.rate", above_zero(1000)},
@@ -120,6 +121,7 @@ const std::vector<std::string>& choices_of(std::string_view key) {
   static const std::vector<std::string> none;
   static const std::map<std::string_view, std::vector<std::string>> table{
       {"legs.type", {"joints", "feet"}},
+      {"legs.clock", {"stamp", "arrival", "estimated"}},
       {"legs.contact", {"kilvo", "paper", "variance", "force"}},
       {"camera.model", {"pinhole_radtan", "equidistant"}},
   };

@@ -87,6 +87,7 @@ std::vector<Setting> list_settings(Settings& s) {
   list.pose("legs.T_imu_feet", robot.legs.T_imu_feet, "two-feet message: its frame's origin in the IMU frame",
             "two-feet message: rotation from its frame to the IMU, row by row");
   list.fields("legs", robot.legs);
+  list.fields("legs", s.leg_clock);
   list.fields("legs", s.estimator.legs);
   list.fields("legs", noise, of_feet);
 

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "kilvo/calibration/leg_clock.hpp"
 #include "kilvo/estimator/config.hpp"
 #include "kilvo/sensors/measurement.hpp"
 #include "kilvo/sensors/robot.hpp"
@@ -25,6 +26,7 @@ struct Settings {
   Robot robot;
   std::string urdf_file;                         // absolute; robot.urdf is its content
   std::array<std::string, sensor_count> topics;  // by Sensor; empty: this robot does not have it
+  LegClockConfig leg_clock;
   EstimatorConfig estimator;
   MappingConfig mapping;
   LiveConfig live;

@@ -1,0 +1,167 @@
+#include "kilvo/calibration/leg_clock.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <iterator>
+
+#include "tests/helpers/simulated.hpp"
+
+namespace kilvo {
+namespace {
+
+// What is wrong with the clocks of a robot. The IMU's stamps are right.
+struct Fault {
+  double offset = 0;         // s, the computer's clock is behind the IMU's by this
+  double drift = 0;          // of the tick against the computer's clock
+  double jitter = 0;         // s, sigma of the arrival
+  double frozen_from = 1e9;  // s, from when on the tick stands still
+  bool with_gyro = true;
+};
+
+Robot robot_of(const lab::SimulatorConfig& config) {
+  Robot robot;
+  std::ifstream file(KILVO_SOURCE_DIR "/config/robots/sim.urdf");
+  robot.urdf.assign(std::istreambuf_iterator<char>(file), {});
+  robot.imu.link = "torso_link";
+  robot.imu.T_link_imu = config.shape.T_torso_imu();
+  robot.legs.rate = config.joints.delivery.rate;
+  const auto sole = config.shape.sole();
+  robot.feet[0] = {"left", "left_ankle_roll_link", {sole.begin(), sole.end()}};
+  robot.feet[1] = {"right", "right_ankle_roll_link", {sole.begin(), sole.end()}};
+  return robot;
+}
+
+struct Event {
+  Time arrived;
+  Measurement m;
+  LowLevel low_level;
+  Time truth{};  // on the IMU's clock
+};
+
+// A walk as a robot's computer receives it.
+class Walk {
+ public:
+  explicit Walk(double duration) : config_(test::only({Sensor::imu, Sensor::legs}, duration)) {
+    config_.joints.delivery.rate = 500;
+    lab::Simulator simulator(test::scenario("room"), config_);
+    start_ = simulator.start();
+    while (auto m = simulator.next()) {
+      if (std::holds_alternative<ImuSample>(*m)) truth_.push_back(simulator.imu_truth());
+      measured_.push_back({simulator.measured(), *std::move(m)});
+    }
+  }
+  const lab::SimulatorConfig& config() const { return config_; }
+  Time start() const { return start_; }
+
+  std::vector<Event> with(const Fault& fault) const {
+    lab::Random random(7, 1);
+    LinkKinematics pelvis(robot_of(config_), "pelvis");
+    std::vector<Event> out;
+    for (const auto& [t, m] : measured_) {
+      const Time computer = t - from_seconds(fault.offset);
+      Event event{computer + from_seconds(0.003 + fault.jitter * random.gaussian()), m, {}, t};
+      if (const auto* joints = std::get_if<JointSample>(&m)) {
+        const double since = to_seconds(t - start_);
+        event.low_level.tick = static_cast<std::uint32_t>(
+            4294960000U + static_cast<std::uint64_t>(std::llround(1e3 * (1 + fault.drift) * std::min(since, fault.frozen_from))));
+        const auto motion = pelvis.at(*joints);
+        if (fault.with_gyro && motion)
+          event.low_level.gyro = Eigen::Vector3d(motion->T_IL.R.inverse() * (rate_at(t) + motion->omega)) +
+                                 0.005 * Eigen::Vector3d(random.gaussian(), random.gaussian(), random.gaussian());
+        std::get<JointSample>(event.m).t = Time{};
+      }
+      out.push_back(std::move(event));
+    }
+    std::ranges::stable_sort(out, {}, &Event::arrived);
+    return out;
+  }
+
+ private:
+  Eigen::Vector3d rate_at(Time t) const {
+    const auto after = std::ranges::lower_bound(truth_, t, {}, &lab::ImuTruth::t);
+    if (after == truth_.begin() || after == truth_.end()) return truth_.front().gyro;
+    const auto before = after - 1;
+    const double share = to_seconds(t - before->t) / to_seconds(after->t - before->t);
+    return before->gyro + share * (after->gyro - before->gyro);
+  }
+
+  lab::SimulatorConfig config_;
+  Time start_;
+  std::vector<std::pair<Time, Measurement>> measured_;
+  std::vector<lab::ImuTruth> truth_;
+};
+
+const Walk& walk() {
+  static const Walk once(20);
+  return once;
+}
+
+struct Errors {
+  double worst_late = 0;  // s, of the leg samples in the last five seconds
+  double found_at = 1e9;  // s of the walk
+  std::uint64_t withheld = 0;
+};
+
+Errors follow(const Fault& fault, const std::string& mode = "estimated") {
+  LegClockConfig config;
+  config.clock = mode;
+  if (fault.with_gyro) config.gyro_link = "pelvis";
+  LegClock clock(config, robot_of(walk().config()));
+  Errors out;
+  for (Event& event : walk().with(fault)) {
+    const double since = to_seconds(event.truth - walk().start());
+    const char* why = clock.follow(event.m, event.arrived, event.low_level);
+    if (clock.offset()) out.found_at = std::min(out.found_at, since);
+    if (!std::holds_alternative<JointSample>(event.m) || why != nullptr || since < 15) continue;
+    out.worst_late = std::max(out.worst_late, std::abs(to_seconds(stamp_of(event.m) - event.truth)));
+  }
+  out.withheld = clock.withheld();
+  return out;
+}
+
+TEST(LegClock, IsFoundToAMillisecondWhateverTheOffset) {
+  for (const double offset : {0.0, 0.1, -0.3, 0.5}) {
+    const Errors errors = follow({.offset = offset, .drift = 50e-6, .jitter = 0.002});
+    EXPECT_LT(errors.worst_late, 1e-3) << offset;
+    EXPECT_LT(errors.found_at, 10) << offset;
+    RecordProperty("worst_late_us", static_cast<int>(1e6 * errors.worst_late));
+    RecordProperty("found_at_ms", static_cast<int>(1e3 * errors.found_at));
+  }
+}
+
+TEST(LegClock, SurvivesATickThatStandsStill) {
+  EXPECT_LT(follow({.offset = 0.2, .jitter = 0.002, .frozen_from = 0}).worst_late, 1e-3);
+  EXPECT_LT(follow({.offset = 0.2, .jitter = 0.002, .frozen_from = 12}).worst_late, 1e-3);
+}
+
+TEST(LegClock, WithoutAGyroscopeTheStandingFootTellsTheRate) {
+  const Errors errors = follow({.offset = 0.3, .drift = -50e-6, .jitter = 0.002, .with_gyro = false});
+  EXPECT_LT(errors.worst_late, 3e-3);
+  EXPECT_LT(errors.found_at, 10);
+}
+
+TEST(LegClock, LegsThatMoveAtAnUnknownTimeAreWithheld) {
+  EXPECT_GT(follow({.offset = 0.3}).withheld, 0u);
+  EXPECT_LT(follow({.offset = 0.3}).withheld, 2500u) << "five seconds of walking";
+}
+
+TEST(LegClock, ArrivalLosesItsJitter) { EXPECT_LT(follow({.drift = 50e-6, .jitter = 0.002}, "arrival").worst_late, 0.003 + 0.7e-3); }
+
+TEST(LegClock, StampLeavesTheTimeAsItIs) {
+  LegClock clock({}, robot_of(walk().config()));
+  JointSample sample;
+  sample.t = time_from_ns(5);
+  Measurement m = sample;
+  EXPECT_EQ(clock.follow(m, time_from_ns(9)), nullptr);
+  EXPECT_EQ(to_ns(stamp_of(m)), 5);
+}
+
+TEST(TickCounter, WrapsAround) {
+  TickCounter counter;
+  const Duration first = counter.unwrapped(0xFFFFFFFEU), later = counter.unwrapped(3);
+  EXPECT_EQ(later - first, std::chrono::milliseconds(5));
+}
+
+}  // namespace
+}  // namespace kilvo
