@@ -1,7 +1,8 @@
-// A message of any type as it came over the wire: KILVO's own decoders read it, by the name of its type.
+// A message of any type as it is on the wire: KILVO's own decoders and encoders read and write it.
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 #include <ros/message_traits.h>
 #include <ros/serialization.h>
 #include <vector>
@@ -37,6 +38,13 @@ struct Serializer<kilvo::ros1::AnyMessage> {
   static void read(Stream& stream, kilvo::ros1::AnyMessage& message) {
     message.bytes.assign(stream.getData(), stream.getData() + stream.getLength());
   }
+  template <class Stream>
+  static void write(Stream& stream, const kilvo::ros1::AnyMessage& message) {
+    const auto size = static_cast<std::uint32_t>(message.bytes.size());
+    std::uint8_t* to = stream.advance(size);
+    if (size > 0) std::memcpy(to, message.bytes.data(), size);
+  }
+  static std::uint32_t serializedLength(const kilvo::ros1::AnyMessage& message) { return static_cast<std::uint32_t>(message.bytes.size()); }
 };
 
 }  // namespace ros::serialization

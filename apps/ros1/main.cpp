@@ -112,21 +112,6 @@ class StartWatch {
   std::jthread thread_;
 };
 
-lab::Settings load(const ros1::Parameters& parameters) {
-  lab::Settings settings = lab::load_settings(parameters.config, parameters.overrides);
-  std::vector<Sensor> used;
-  for (int i = 0; i < sensor_count; ++i) {
-    if (settings.has(static_cast<Sensor>(i))) used.push_back(static_cast<Sensor>(i));
-  }
-  if (used.empty() || used.front() != Sensor::imu)
-    throw lab::ConfigError(parameters.config + ": imu.topic is missing: nothing is estimated without the IMU");
-  lab::require_complete(settings, used);
-  // As `kilvo run --realtime`: on a robot the other cores are for others.
-  if (!settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
-  if (!settings.given.contains("estimator.threads")) settings.estimator.threads = 1;
-  return settings;
-}
-
 int run(int argc, char** argv) {
   const StopSignals stop;
   CommandLine words(argc, argv);
@@ -137,7 +122,7 @@ int run(int argc, char** argv) {
   words.set_parameters(own);
   const ros1::Parameters parameters = ros1::read_parameters(own);
   {
-    ros1::Node kilvo(parameters, load(parameters));
+    ros1::Node kilvo(parameters, node::load_settings(parameters.options.config, parameters.overrides));
     start.reset();
     while (ros::ok() && !stop.came_within(100'000'000)) kilvo.tick();
   }

@@ -1,21 +1,19 @@
-// The node: what comes on the topics goes through the live runner, what it says goes out.
+// The node in ROS 1: topics and services around node::Node.
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <optional>
+#include <ros/callback_queue.h>
 #include <ros/node_handle.h>
-#include <shared_mutex>
+#include <ros/spinner.h>
 #include <string>
 #include <vector>
 
-#include "apps/live/live_runner.hpp"
-#include "apps/ros1/diagnostics.hpp"
-#include "apps/ros1/map_thread.hpp"
+#include "apps/node/node.hpp"
 #include "apps/ros1/master_watch.hpp"
 #include "apps/ros1/parameters.hpp"
-#include "apps/ros1/sensor_inputs.hpp"
-#include "apps/ros1/state_outlet.hpp"
+#include "apps/ros1/ros_inputs.hpp"
+#include "apps/ros1/ros_outlet.hpp"
 
 namespace kilvo::ros1 {
 
@@ -34,43 +32,13 @@ class Node {
   void stop();
 
  private:
-  /// One life of the estimator, from its start to a reset.
-  struct Life {
-    Life(const lab::Settings& settings, live::LiveRunner::Sinks sinks);
-    Estimator estimator;
-    live::LiveRunner runner;
-  };
-
-  std::unique_ptr<Life> begin_life();
-  void end_life();
-  void push(Measurement m);
-  bool is_of_this_robot(const JointSample& sample);
-  Condition condition();
   void offer_services();
-  bool save_map(TriggerAnswer& answer);
-  bool reset(TriggerAnswer& answer);
-  bool pause(Sensor sensor, bool paused, SetBoolAnswer& answer);
 
-  Parameters parameters_;
-  lab::Settings settings_;
-  StateOutlet states_;
-  MapThread map_;
-  std::optional<LegKinematics> kinematics_;  // of the thread of IMU and legs
-
-  mutable std::shared_mutex life_mutex_;  // exclusive while one life ends and the next begins
-  std::unique_ptr<Life> life_;
-  mutable std::mutex mismatch_mutex_;
-  std::string legs_mismatch_;
-
-  // Of the thread that ticks:
-  std::optional<MasterWatch> master_;
-  std::string last_essence_;
-  SteadyClock::time_point last_diagnostics_{};
-  std::string last_waiting_;
-
-  ros::Publisher diagnostics_;
+  RosOutlet outlet_;
+  node::Node node_;
+  std::optional<MasterWatch> master_;  // of the thread that ticks
   std::vector<ros::ServiceServer> services_;
-  std::unique_ptr<SensorInputs> inputs_;
+  std::optional<RosInputs> inputs_;
   ros::CallbackQueue service_queue_;
   std::unique_ptr<ros::AsyncSpinner> service_spinner_;
 };

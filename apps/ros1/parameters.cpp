@@ -95,36 +95,45 @@ class Reader {
 };
 
 // What users of FAST-LIO have wired up: one world, whose corrections are steps, and the IMU as the body.
-Names names_of_fast_lio() {
-  Names names;
-  names.map_frame = names.odom_frame = "camera_init";
-  names.base_frame = "body";
-  names.odometry = "/Odometry";
-  names.path = "/path";
-  names.cloud = "/cloud_registered";
-  return names;
+void name_as_fast_lio(Parameters& p) {
+  p.options.map_frame = p.options.odom_frame = "camera_init";
+  p.options.base = "imu";
+  p.options.base_frame = "body";
+  p.names.of(node::Topic::odometry) = "/Odometry";
+  p.names.of(node::Topic::path) = "/path";
+  p.names.of(node::Topic::cloud) = "/cloud_registered";
 }
 
 }  // namespace
 
+Names::Names() {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string name = node::topic_facts[i].name;
+    names[i] = name.starts_with('/') ? name : "~" + name;
+  }
+}
+
 Parameters read_parameters(const ros::NodeHandle& own) {
   Reader reader(own);
   Parameters out;
-  out.config = reader.text("config", "");
+  node::Options& options = out.options;
+  options.config = reader.text("config", "");
   out.overrides = reader.texts("set");
-  if (reader.one_of("compat", {"", "fast_lio"}) == "fast_lio") out.names = names_of_fast_lio();
-  out.names.map_frame = reader.frame("map_frame", out.names.map_frame);
-  out.names.odom_frame = reader.frame("odom_frame", out.names.odom_frame);
-  out.names.base_frame = reader.frame("base_frame", out.names.base_frame);
-  out.base_is_link = reader.one_of("base", {"imu", "link"}) == "link";
-  out.no_deskew = reader.flag("no_deskew");
-  out.tf_rate = reader.number("tf_rate", out.tf_rate, 1, 1000);
-  out.map_file = reader.text("map_file", "kilvo_map.ply");
+  if (reader.one_of("compat", {"", "fast_lio"}) == "fast_lio") name_as_fast_lio(out);
+  options.map_frame = reader.frame("map_frame", options.map_frame);
+  options.odom_frame = reader.frame("odom_frame", options.odom_frame);
+  options.base = reader.text("base", options.base);
+  options.base_frame = reader.text("base_frame", options.base_frame);
+  if (options.base_frame.starts_with('/')) options.base_frame.erase(0, 1);
+  options.no_deskew = reader.flag("no_deskew");
+  options.tf_rate = reader.number("tf_rate", options.tf_rate, 1, 1000);
+  options.map_file = reader.text("map_file", options.map_file);
   reader.refuse_unknown();
-  if (out.config.empty()) throw Reader::wrong("config", "is missing: the path of a configuration file, such as config/robots/g1.yaml");
-  if (out.map_file.empty()) throw Reader::wrong("map_file", "must be the path of a file");
-  if (out.names.base_frame == out.names.odom_frame || out.names.base_frame == out.names.map_frame)
-    throw Reader::wrong("base_frame", fmt::format("is '{}', as is the frame that it moves in", out.names.base_frame));
+  if (options.config.empty()) throw Reader::wrong("config", "is missing: the path of a configuration file, such as config/robots/g1.yaml");
+  if (options.map_file.empty()) throw Reader::wrong("map_file", "must be the path of a file");
+  const std::string& frame = options.base_frame;
+  if (!frame.empty() && (frame == options.odom_frame || frame == options.map_frame))
+    throw Reader::wrong("base_frame", fmt::format("is '{}', as is the frame that it moves in", frame));
   return out;
 }
 

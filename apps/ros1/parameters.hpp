@@ -1,10 +1,14 @@
 // What the node is told by its private ROS parameters. What the robot is and how it is estimated stands in the configuration file alone.
 #pragma once
 
+#include <array>
 #include <ros/node_handle.h>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "apps/node/options.hpp"
+#include "apps/node/outlet.hpp"
 
 namespace kilvo::ros1 {
 
@@ -13,23 +17,19 @@ struct ParameterError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// How topics and frames are called. The first ones: of the best estimate; `smooth`: of the one without steps.
+/// How the topics are called.
 struct Names {
-  std::string map_frame = "map";    // the best estimate's world: corrections are steps
-  std::string odom_frame = "odom";  // the smooth one's (REP 105)
-  std::string base_frame = "base_link";
-  std::string odometry = "~odometry", smooth = "~odometry_smooth", path = "~path", cloud = "~cloud", coloured = "~cloud_coloured",
-              contacts = "~contacts", ground = "~ground";
+  std::array<std::string, node::topic_count> names;
+
+  Names();
+  std::string& of(node::Topic topic) { return names[static_cast<std::size_t>(topic)]; }
+  const std::string& of(node::Topic topic) const { return names[static_cast<std::size_t>(topic)]; }
 };
 
 struct Parameters {
-  std::string config;                  // the configuration file
   std::vector<std::string> overrides;  // KEY=VALUE, as `kilvo run --set`
   Names names;
-  bool base_is_link = false;  // the base is the URDF link that imu.T_link_imu names; false: the IMU itself
-  bool no_deskew = false;     // as `kilvo run --no-deskew`
-  double tf_rate = 100;       // Hz at most
-  std::string map_file;       // where ~save_map writes
+  node::Options options;
 };
 
 /// Throws ParameterError: one missing, unknown, of a wrong type or out of its range.

@@ -1,5 +1,5 @@
-// The messages that the node sends. ROS 1's generated headers ask allocators for a member that C++20 has taken from std::allocator; with an
-// allocator that still has it they compile as they are.
+// What ROS 1 knows the messages of the node by. Its generated headers ask allocators for a member that C++20 has taken from std::allocator;
+// with an allocator that still has it they compile as they are.
 #pragma once
 
 #include <diagnostic_msgs/DiagnosticArray.h>
@@ -34,27 +34,15 @@ struct Allocator : std::allocator<T> {
 using RosAllocator = Allocator<void>;
 using OdometryMessage = nav_msgs::Odometry_<RosAllocator>;
 using PathMessage = nav_msgs::Path_<RosAllocator>;
-using PoseStamped = geometry_msgs::PoseStamped_<RosAllocator>;
-using Pose = geometry_msgs::Pose_<RosAllocator>;
 using PosesMessage = geometry_msgs::PoseArray_<RosAllocator>;
-using TransformStamped = geometry_msgs::TransformStamped_<RosAllocator>;
 using TransformsMessage = tf2_msgs::TFMessage_<RosAllocator>;
 using CloudMessage = sensor_msgs::PointCloud2_<RosAllocator>;
-using CloudField = sensor_msgs::PointField_<RosAllocator>;
 using JointMessage = sensor_msgs::JointState_<RosAllocator>;
 using DiagnosticsMessage = diagnostic_msgs::DiagnosticArray_<RosAllocator>;
-using DiagnosticStatus = diagnostic_msgs::DiagnosticStatus_<RosAllocator>;
-using DiagnosticValue = diagnostic_msgs::KeyValue_<RosAllocator>;
 using Trigger = std_srvs::TriggerRequest_<RosAllocator>;
 using TriggerAnswer = std_srvs::TriggerResponse_<RosAllocator>;
 using SetBool = std_srvs::SetBoolRequest_<RosAllocator>;
 using SetBoolAnswer = std_srvs::SetBoolResponse_<RosAllocator>;
-
-inline ros::Time ros_time(Time t) {
-  constexpr std::int64_t second = 1'000'000'000;
-  const std::int64_t ns = to_ns(t);
-  return ns < 0 ? ros::Time() : ros::Time(static_cast<std::uint32_t>(ns / second), static_cast<std::uint32_t>(ns % second));
-}
 
 inline Time time_of(const ros::Time& t) { return time_from_ns(static_cast<std::int64_t>(t.toNSec())); }
 

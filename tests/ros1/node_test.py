@@ -107,7 +107,8 @@ class Story:
                     process.end(signal.SIGKILL)
 
     def start_node(self, *parameters: str) -> Process:
-        return Process(ARGUMENTS.node, *(parameters or (f"_config:={self.config}", f"_map_file:={self.map_file}")))
+        # The truth is that of the IMU.
+        return Process(ARGUMENTS.node, "_base:=imu", *(parameters or (f"_config:={self.config}", f"_map_file:={self.map_file}")))
 
     def start_anew(self, config: str) -> None:
         self.node.end()

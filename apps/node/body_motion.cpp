@@ -1,6 +1,6 @@
-#include "apps/ros1/body_motion.hpp"
+#include "apps/node/body_motion.hpp"
 
-namespace kilvo::ros1 {
+namespace kilvo::node {
 namespace {
 
 constexpr int position = 0, rotation = 3;  // in a pose of ROS
@@ -45,11 +45,12 @@ bool BodyMotion::is_finite() const {
          twist_covariance.allFinite();
 }
 
-BodyMotion body_motion(const Output& output, const SE3& T_IB, double rate_variance) {
+BodyMotion body_motion(const Output& output, const LinkMotion& base, double rate_variance) {
+  const SE3& T_IB = base.T_IL;
   const Eigen::Vector3d v_I = output.x.R.inverse() * output.x.v;
   const SO3 R_BI = T_IB.R.inverse();
-  return {output.x.pose() * T_IB, R_BI * (v_I + output.omega.cross(T_IB.p)), R_BI * output.omega, pose_covariance(output, T_IB.p),
-          twist_covariance(output, v_I, T_IB, rate_variance)};
+  return {output.x.pose() * T_IB, R_BI * (v_I + output.omega.cross(T_IB.p) + base.v), R_BI * (output.omega + base.omega),
+          pose_covariance(output, T_IB.p), twist_covariance(output, v_I, T_IB, rate_variance)};
 }
 
 BodyMotion seen_from(const BodyMotion& motion, const Output& output, const SE3& T_OI, const SE3& T_IB) {
@@ -64,4 +65,4 @@ BodyMotion seen_from(const BodyMotion& motion, const Output& output, const SE3& 
   return out;
 }
 
-}  // namespace kilvo::ros1
+}  // namespace kilvo::node

@@ -1,31 +1,21 @@
-#include "apps/ros1/diagnostics.hpp"
+#include "apps/node/diagnostics.hpp"
 
 #include <algorithm>
 #include <fmt/core.h>
 
-namespace kilvo::ros1 {
+namespace kilvo::node {
 namespace {
 
 // By the clock on the wall: three messages in a row, but no less than a machine may be busy.
 constexpr double least_silence = 0.2, periods_of_silence = 3;  // s, -
 
-void add(DiagnosticStatus& status, const std::string& key, const std::string& value) {
-  DiagnosticValue entry;
-  entry.key = std::string_view(key);
-  entry.value = std::string_view(value);
-  status.values.push_back(entry);
-}
+void add(DiagnosticStatus& status, const std::string& key, const std::string& value) { status.values.push_back({key, value}); }
 
-DiagnosticStatus named(const std::string& name) {
-  DiagnosticStatus out;
-  out.name = std::string_view("kilvo: " + name);
-  out.hardware_id = "kilvo";
-  return out;
-}
+DiagnosticStatus named(const std::string& name) { return {DiagnosticStatus::ok, "kilvo: " + name, "", "kilvo", {}}; }
 
 void say(DiagnosticStatus& status, std::uint8_t level, const std::string& text) {
-  status.level = static_cast<decltype(status.level)>(level);
-  status.message = std::string_view(text);
+  status.level = level;
+  status.message = text;
 }
 
 /// The level and the reason; nothing when the sensor is well.
@@ -37,12 +27,14 @@ struct Trouble {
 std::optional<Trouble> trouble_of(Sensor sensor, const Condition& c) {
   const auto s = static_cast<std::size_t>(sensor);
   const InputState& input = c.inputs[s];
-  if (input.paused) return Trouble{DiagnosticStatus::WARN, fmt::format("lost: paused by ~pause/{}", name_of(sensor))};
-  if (!input.last) return Trouble{DiagnosticStatus::ERROR, "lost: no message on " + input.topic + " yet"};
+  if (input.paused) return Trouble{DiagnosticStatus::warn, fmt::format("lost: paused by the service pause/{}", name_of(sensor))};
+  if (!input.connection.empty() && (!input.last || silence_of(input, c.rates[s], c.now)))
+    return Trouble{DiagnosticStatus::error, fmt::format("lost: {}: {}", input.topic, input.connection)};
+  if (!input.last) return Trouble{DiagnosticStatus::error, "lost: no message on " + input.topic + " yet"};
   if (const auto silent = silence_of(input, c.rates[s], c.now))
-    return Trouble{DiagnosticStatus::ERROR, fmt::format("lost: no message on {} for {:.1f} s", input.topic, *silent)};
-  if (sensor == Sensor::legs && !c.legs_mismatch.empty()) return Trouble{DiagnosticStatus::ERROR, "lost: " + c.legs_mismatch};
-  if (!input.fault.empty()) return Trouble{DiagnosticStatus::ERROR, fmt::format("lost: {}: {}", input.topic, input.fault)};
+    return Trouble{DiagnosticStatus::error, fmt::format("lost: no message on {} for {:.1f} s", input.topic, *silent)};
+  if (sensor == Sensor::legs && !c.legs_mismatch.empty()) return Trouble{DiagnosticStatus::error, "lost: " + c.legs_mismatch};
+  if (!input.fault.empty()) return Trouble{DiagnosticStatus::error, fmt::format("lost: {}: {}", input.topic, input.fault)};
   return std::nullopt;
 }
 
@@ -50,11 +42,13 @@ DiagnosticStatus status_of(Sensor sensor, const Condition& c) {
   const auto s = static_cast<std::size_t>(sensor);
   const InputState& input = c.inputs[s];
   DiagnosticStatus out = named(name_of(sensor));
-  const Trouble trouble = trouble_of(sensor, c).value_or(Trouble{DiagnosticStatus::OK, "ok"});
+  const Trouble trouble = trouble_of(sensor, c).value_or(Trouble{DiagnosticStatus::ok, "ok"});
   say(out, trouble.level, trouble.text);
   add(out, "topic", input.topic);
   add(out, "messages", std::to_string(input.messages));
+  if (!input.connection.empty()) add(out, "connection", input.connection);
   for (const auto& [cause, count] : input.counts.dropped) add(out, "dropped: " + cause, std::to_string(count));
+  if (sensor == Sensor::legs && input.clock) add(out, "clock found (s)", fmt::format("{:+.4f}", *input.clock));
   if (input.counts.unstamped > 0) add(out, "without a stamp", std::to_string(input.counts.unstamped));
   const SensorCount& seen = c.seen.sensors[s];
   add(out, "used", std::to_string(seen.used));
@@ -72,7 +66,7 @@ DiagnosticStatus status_of(Sensor sensor, const Condition& c) {
 DiagnosticStatus status_of_estimate(const Condition& c) {
   DiagnosticStatus out = named("estimator");
   if (!c.estimate) {
-    say(out, DiagnosticStatus::WARN, c.waiting_for.empty() ? "waiting for the first output" : c.waiting_for);
+    say(out, DiagnosticStatus::warn, c.waiting_for.empty() ? "waiting for the first output" : c.waiting_for);
     return out;
   }
   std::string lost;
@@ -82,10 +76,12 @@ DiagnosticStatus status_of_estimate(const Condition& c) {
       lost += (lost.empty() ? "" : ", ") + std::string(name_of(sensor));
   }
   const EstimateState& e = *c.estimate;
-  std::uint8_t level = lost.empty() ? DiagnosticStatus::OK : DiagnosticStatus::WARN;
-  if (e.modality == Modality::coast || c.seen.diverged || trouble_of(Sensor::imu, c)) level = DiagnosticStatus::ERROR;
+  std::uint8_t level = lost.empty() ? DiagnosticStatus::ok : DiagnosticStatus::warn;
+  if (!c.base_waits_for.empty()) level = DiagnosticStatus::warn;
+  if (e.modality == Modality::coast || c.seen.diverged || trouble_of(Sensor::imu, c)) level = DiagnosticStatus::error;
   std::string text = fmt::format("{} ({})", name_of(e.modality), text_of(e.cause));
   if (!lost.empty()) text += ", lost: " + lost;
+  if (!c.base_waits_for.empty()) text += ", " + c.base_waits_for;
   if (c.seen.diverged) text += ", diverged";
   say(out, level, text);
   add(out, "modality", name_of(e.modality));
@@ -120,7 +116,7 @@ std::vector<DiagnosticStatus> statuses(const Condition& condition) {
 std::string essence(const std::vector<DiagnosticStatus>& statuses) {
   std::string out;
   for (const DiagnosticStatus& status : statuses) out += std::to_string(status.level);
-  return out + statuses.front().message.c_str();
+  return out + statuses.front().message;
 }
 
-}  // namespace kilvo::ros1
+}  // namespace kilvo::node

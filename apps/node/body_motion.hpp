@@ -4,9 +4,10 @@
 #include <Eigen/Core>
 
 #include "kilvo/estimator/output.hpp"
+#include "kilvo/legs/link_kinematics.hpp"
 #include "kilvo/math/se3.hpp"
 
-namespace kilvo::ros1 {
+namespace kilvo::node {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
@@ -19,10 +20,11 @@ struct BodyMotion {
   bool is_finite() const;
 };
 
-/// `T_IB`: the base in the IMU frame. `rate_variance`: of the white noise of the angular rate, each axis, (rad/s)^2.
-BodyMotion body_motion(const Output& output, const SE3& T_IB, double rate_variance);
+/// `base`: where it is, and how it moves, as the IMU sees it. `rate_variance`: of the white noise of the angular rate, each axis,
+/// (rad/s)^2.
+BodyMotion body_motion(const Output& output, const LinkMotion& base, double rate_variance);
 
 /// The same seen from another world, in which the IMU's pose is `T_OI`: covariances are turned with it.
 BodyMotion seen_from(const BodyMotion& motion, const Output& output, const SE3& T_OI, const SE3& T_IB);
 
-}  // namespace kilvo::ros1
+}  // namespace kilvo::node

@@ -1,11 +1,11 @@
-#include "apps/ros1/diagnostics.hpp"
+#include "apps/node/diagnostics.hpp"
 
 #include <cstring>
 #include <gtest/gtest.h>
 
-#include "apps/ros1/clouds.hpp"
+#include "apps/node/clouds.hpp"
 
-namespace kilvo::ros1 {
+namespace kilvo::node {
 namespace {
 
 using std::chrono::milliseconds;
@@ -26,7 +26,7 @@ Condition all_is_well() {
 
 std::string message_of(const std::vector<DiagnosticStatus>& all, const std::string& name) {
   for (const DiagnosticStatus& status : all) {
-    if (name == status.name.c_str()) return status.message.c_str();
+    if (name == status.name) return status.message;
   }
   return "no status of this name";
 }
@@ -34,7 +34,7 @@ std::string message_of(const std::vector<DiagnosticStatus>& all, const std::stri
 TEST(Diagnostics, AreOkWhenAllIsWell) {
   const auto all = statuses(all_is_well());
   ASSERT_EQ(all.size(), 5u);
-  for (const DiagnosticStatus& status : all) EXPECT_EQ(+status.level, +DiagnosticStatus::OK) << status.name << status.message;
+  for (const DiagnosticStatus& status : all) EXPECT_EQ(+status.level, +DiagnosticStatus::ok) << status.name << status.message;
 }
 
 TEST(Diagnostics, NameEachLostSensorWithinHalfASecond) {
@@ -46,7 +46,7 @@ TEST(Diagnostics, NameEachLostSensorWithinHalfASecond) {
     EXPECT_EQ(message_of(all, "kilvo: " + name), "lost: no message on /" + name + " for 0.4 s");
     EXPECT_NE(message_of(all, "kilvo: estimator").find("lost: " + name), std::string::npos);
     EXPECT_NE(essence(all), essence(statuses(all_is_well()))) << "told at once";
-    EXPECT_EQ(all.front().level == DiagnosticStatus::ERROR, name == "imu") << "without the IMU there is no estimate";
+    EXPECT_EQ(all.front().level == DiagnosticStatus::error, name == "imu") << "without the IMU there is no estimate";
   }
 }
 
@@ -57,7 +57,7 @@ TEST(Diagnostics, SayWhyASensorIsNotUsed) {
   c.inputs[2].fault = "no point times";
   auto all = statuses(c);
   EXPECT_EQ(message_of(all, "kilvo: imu"), "lost: no message on /imu yet");
-  EXPECT_EQ(message_of(all, "kilvo: legs"), "lost: paused by ~pause/legs");
+  EXPECT_EQ(message_of(all, "kilvo: legs"), "lost: paused by the service pause/legs");
   EXPECT_EQ(message_of(all, "kilvo: lidar"), "lost: /lidar: no point times");
   c.inputs[1].paused = false;
   c.legs_mismatch = "no joint left_knee";
@@ -75,13 +75,13 @@ TEST(Diagnostics, ASensorThatTheRobotDoesNotHaveIsNotSpokenOf) {
   Condition c = all_is_well();
   c.inputs[3] = {};
   EXPECT_EQ(message_of(statuses(c), "kilvo: camera"), "no status of this name");
-  EXPECT_EQ(+statuses(c).front().level, +DiagnosticStatus::OK);
+  EXPECT_EQ(+statuses(c).front().level, +DiagnosticStatus::ok);
 }
 
 TEST(Clouds, ColoursArePackedAsRvizReadsThem) {
   const std::vector<ColouredPoint> points = {{{1, 2, 3}, {0x11, 0x22, 0x33}, 1}};
-  const CloudMessage cloud = cloud_message(points, time_from_ns(1'500'000'000), "map");
-  EXPECT_EQ(cloud.header.stamp, ros::Time(1, 500'000'000));
+  const PointCloud cloud = cloud_message(points, time_from_ns(1'500'000'000), "map");
+  EXPECT_EQ(to_ns(cloud.header.stamp), 1'500'000'000);
   ASSERT_EQ(cloud.data.size(), 16u);
   float z = 0;
   std::memcpy(&z, cloud.data.data() + 8, sizeof z);
@@ -92,4 +92,4 @@ TEST(Clouds, ColoursArePackedAsRvizReadsThem) {
 }
 
 }  // namespace
-}  // namespace kilvo::ros1
+}  // namespace kilvo::node

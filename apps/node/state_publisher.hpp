@@ -3,16 +3,16 @@
 
 #include <mutex>
 #include <optional>
-#include <ros/node_handle.h>
 #include <string>
 
-#include "apps/ros1/body_motion.hpp"
-#include "apps/ros1/parameters.hpp"
-#include "apps/ros1/ros_messages.hpp"
+#include "apps/node/base_frame.hpp"
+#include "apps/node/body_motion.hpp"
+#include "apps/node/outlet.hpp"
+#include "apps/node/output_messages.hpp"
 #include "kilvo/estimator/smooth_odometry.hpp"
 #include "lab/settings/settings.hpp"
 
-namespace kilvo::ros1 {
+namespace kilvo::node {
 
 /// What the newest state says of the estimate as a whole.
 struct EstimateState {
@@ -23,9 +23,10 @@ struct EstimateState {
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();  // m^2
 };
 
-class StateOutlet {
+class StatePublisher {
  public:
-  StateOutlet(const Parameters& parameters, const lab::Settings& settings);
+  /// `base` must outlive it.
+  StatePublisher(const Options& options, const lab::Settings& settings, const BaseFrame& base, Outlet outlet);
 
   /// In time order, from one thread.
   void take(const Output& output);
@@ -41,27 +42,27 @@ class StateOutlet {
 
  private:
   void note(const Output& output, const BodyMotion& best);
-  void publish(const ros::Publisher& publisher, const BodyMotion& motion, Time t, const std::string& frame) const;
-  void publish_transforms(const BodyMotion& best, const BodyMotion& smooth, Time t);
-  void publish_contacts(const Contacts& contacts);
+  void publish(Topic topic, const BodyMotion& motion, Time t, const std::string& frame) const;
+  void publish_transforms(const SE3& best, const SE3& smooth, Time t) const;
+  void publish_contacts(const Contacts& contacts) const;
   void publish_ground(const Contacts& contacts);
   void extend_path(const BodyMotion& best, Time t);
 
-  Names names_;
-  SE3 T_IB_;
+  std::string map_frame_, odom_frame_;
+  const BaseFrame& base_;
+  Outlet outlet_;
   double rate_variance_;
   double smooth_time_;
   Duration tf_period_;
   std::array<std::string, 2> feet_;
-  ros::Publisher odometry_, smooth_odometry_, transforms_, contacts_, ground_, path_;
   SmoothOdometry smooth_;
   std::uint32_t epoch_ = 0;
   std::optional<Time> last_tf_, last_ground_, last_path_;
 
   mutable std::mutex mutex_;
   std::optional<EstimateState> newest_;
-  PathMessage way_;
+  Path way_;
   bool way_has_grown_ = false;
 };
 
-}  // namespace kilvo::ros1
+}  // namespace kilvo::node

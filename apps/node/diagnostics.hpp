@@ -5,11 +5,11 @@
 #include <optional>
 #include <string>
 
-#include "apps/ros1/ros_messages.hpp"
-#include "apps/ros1/sensor_inputs.hpp"
-#include "apps/ros1/state_outlet.hpp"
+#include "apps/node/output_messages.hpp"
+#include "apps/node/sensor_inputs.hpp"
+#include "apps/node/state_publisher.hpp"
 
-namespace kilvo::ros1 {
+namespace kilvo::node {
 
 /// All that is known at one moment.
 struct Condition {
@@ -19,7 +19,8 @@ struct Condition {
   std::optional<EstimateState> estimate;
   Statistics seen;
   std::string waiting_for;
-  std::string legs_mismatch;  // why the legs' messages are not of this robot
+  std::string base_waits_for;  // which joints, so that there is a pose of the base
+  std::string legs_mismatch;   // why the legs' messages are not of this robot
   std::uint64_t clouds_given_up = 0;
 };
 
@@ -32,4 +33,4 @@ std::string essence(const std::vector<DiagnosticStatus>& statuses);
 /// For how long nothing has come of a sensor, when that is too long, s.
 std::optional<double> silence_of(const InputState& input, double rate, SteadyClock::time_point now);
 
-}  // namespace kilvo::ros1
+}  // namespace kilvo::node

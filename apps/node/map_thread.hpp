@@ -5,19 +5,19 @@
 #include <cstdint>
 #include <deque>
 #include <mutex>
-#include <ros/node_handle.h>
 #include <string>
 #include <thread>
 
-#include "apps/ros1/parameters.hpp"
+#include "apps/node/outlet.hpp"
 #include "kilvo/estimator/output.hpp"
 #include "lab/mapping/map_builder.hpp"
 
-namespace kilvo::ros1 {
+namespace kilvo::node {
 
 class MapThread {
  public:
-  MapThread(const Names& names, const lab::MappingConfig& config);
+  /// `frame`: of the world, for the clouds.
+  MapThread(std::string frame, const lab::MappingConfig& config, Outlet outlet);
   ~MapThread();
   MapThread(const MapThread&) = delete;
   MapThread& operator=(const MapThread&) = delete;
@@ -39,7 +39,7 @@ class MapThread {
 
   lab::MappingConfig config_;
   std::string frame_;
-  ros::Publisher cloud_, coloured_;
+  Outlet outlet_;
 
   mutable std::mutex waiting_mutex_;
   std::condition_variable news_;
@@ -53,4 +53,4 @@ class MapThread {
   std::thread thread_;  // last: it uses all of the above
 };
 
-}  // namespace kilvo::ros1
+}  // namespace kilvo::node

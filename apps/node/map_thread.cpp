@@ -1,23 +1,24 @@
-#include "apps/ros1/map_thread.hpp"
+#include "apps/node/map_thread.hpp"
 
+<<<<<<< HEAD:apps/ros1/map_thread.cpp
 #include <ros/names.h>
 #include <utility>
 
 #include "apps/ros1/clouds.hpp"
+=======
+#include "apps/node/clouds.hpp"
+>>>>>>> 9d7c7fa (node: what a node does without its middleware; the base may be any link):apps/node/map_thread.cpp
 #include "lab/mapping/ply.hpp"
 
-namespace kilvo::ros1 {
+namespace kilvo::node {
 namespace {
 
 constexpr std::size_t most_waiting = 64;  // sweeps and images: some seconds, while a map is written
-constexpr std::uint32_t most_unsent = 4;  // clouds
 
 }  // namespace
 
-MapThread::MapThread(const Names& names, const lab::MappingConfig& config) : config_(config), frame_(names.map_frame), map_(config) {
-  ros::NodeHandle node;
-  cloud_ = node.advertise<CloudMessage>(ros::names::resolve(names.cloud), most_unsent);
-  coloured_ = node.advertise<CloudMessage>(ros::names::resolve(names.coloured), most_unsent);
+MapThread::MapThread(std::string frame, const lab::MappingConfig& config, Outlet outlet)
+    : config_(config), frame_(std::move(frame)), outlet_(std::move(outlet)), map_(config) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -56,8 +57,10 @@ void MapThread::run() {
 }
 
 void MapThread::put(const Output& output) {
-  if (output.is_sweep && cloud_.getNumSubscribers() > 0) cloud_.publish(cloud_message(output.points_W, output.t, frame_));
-  if (!output.coloured.empty() && coloured_.getNumSubscribers() > 0) coloured_.publish(cloud_message(output.coloured, output.t, frame_));
+  if (output.is_sweep && outlet_.is_wanted(Topic::cloud))
+    outlet_.publish(Topic::cloud, output.t, cloud_message(output.points_W, output.t, frame_));
+  if (!output.coloured.empty() && outlet_.is_wanted(Topic::coloured))
+    outlet_.publish(Topic::coloured, output.t, cloud_message(output.coloured, output.t, frame_));
   const std::lock_guard lock(map_mutex_);
   // The map of another epoch is of another world.
   if (std::exchange(epoch_, output.epoch) != output.epoch) map_ = lab::MapBuilder(config_);
@@ -85,4 +88,4 @@ std::uint64_t MapThread::given_up() const {
   return given_up_;
 }
 
-}  // namespace kilvo::ros1
+}  // namespace kilvo::node
