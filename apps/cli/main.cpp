@@ -32,6 +32,7 @@ int parse_and_do(const std::vector<std::string>& words) {
   program.get_formatter()->label("SUBCOMMAND", "VERB");
   Action chosen;
   add_run(program, chosen);
+  add_live(program, chosen);
   add_info(program, chosen);
   add_eval(program, chosen);
   add_compare(program, chosen);

@@ -1,5 +1,6 @@
 #include "apps/cli/run_recording.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <fmt/core.h>
 #include <utility>
@@ -40,6 +41,8 @@ lab::RecordingOptions recording_options(const RunOptions& options, const lab::Se
   for (const Sensor sensor : used) {
     out[sensor] = {true, settings.topic(sensor), mount_rate(settings.robot, sensor), mount_offset(settings.robot, sensor)};
   }
+  const bool with_legs = std::ranges::find(used, Sensor::legs) != used.end();
+  if (with_legs && settings.leg_clock.clock != "stamp") out.leg_clock.emplace(settings.leg_clock, settings.robot);
   out.no_deskew = options.no_deskew;
   out.start = options.start;
   out.duration = options.duration;

@@ -22,6 +22,7 @@ void add_report(CLI::App& program, Action& chosen);
 void add_convert(CLI::App& program, Action& chosen);
 void add_config(CLI::App& program, Action& chosen);
 void add_demo(CLI::App& program, Action& chosen);
+void add_live(CLI::App& program, Action& chosen);
 void add_simulate(CLI::App& program, Action& chosen);
 
 /// The alignment of that name. Throws UsageError that names the nearest.

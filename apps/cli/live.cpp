@@ -1,0 +1,87 @@
+// kilvo live --config FILE
+#include <fmt/core.h>
+#include <memory>
+#include <mutex>
+
+#include "apps/cli/exit_code.hpp"
+#include "apps/cli/interrupt.hpp"
+#include "apps/cli/verbs.hpp"
+#ifdef KILVO_WITH_DDS
+#include "apps/dds/live.hpp"
+#include "apps/node/node.hpp"
+#endif
+
+namespace kilvo::cli {
+namespace {
+
+struct LiveWords {
+  std::string config, interface;
+  int domain = 0;
+  std::vector<std::string> peers, overrides;
+  bool no_deskew = false;
+};
+
+#ifdef KILVO_WITH_DDS
+
+node::Options options_of(const LiveWords& words, const lab::LiveConfig& live) {
+  node::Options out;
+  out.config = words.config;
+  out.map_frame = live.map_frame;
+  out.odom_frame = live.odom_frame;
+  out.base = live.base;
+  out.base_frame = live.base_frame;
+  out.no_deskew = words.no_deskew;
+  out.tf_rate = live.tf_rate;
+  out.map_file = live.map_file;
+  return out;
+}
+
+int live(const LiveWords& words) {
+  InterruptWatch interrupt;  // before any thread
+  const lab::Settings settings = node::load_settings(words.config, words.overrides);
+  std::mutex line;
+  const auto say = [&line](const std::string& text) {
+    const std::lock_guard lock(line);
+    fmt::print(stderr, "kilvo: {}\n", text);
+  };
+  dds::LiveOptions options{{words.domain, words.interface, words.peers}, options_of(words, settings.live), settings.live.name};
+  try {
+    dds::run_live(
+        options, settings, [&interrupt] { return interrupt.requested(); }, say);
+  } catch (const dds::DdsError& error) {
+    throw UsageError(fmt::format("live: {}", error.what()));
+  }
+  return done;
+}
+
+#else
+
+int live(const LiveWords&) {
+  throw UsageError(
+      "live: this kilvo was built without DDS: install cyclonedds-dev and cyclonedds-tools (scripts/install_dependencies --dds) and build "
+      "it "
+      "again");
+}
+
+#endif
+
+}  // namespace
+
+void add_live(CLI::App& program, Action& chosen) {
+  auto words = std::make_shared<LiveWords>();
+  CLI::App* verb = program.add_subcommand("live", "estimate on the robot: sensors and results over DDS, as ROS 2 and Unitree speak it");
+  verb->add_option("--config", words->config, "robot, sensors, topics and tuning")->type_name("FILE")->required();
+  verb->add_option("--interface", words->interface, "network interface, by name or address; default: the one that Cyclone DDS finds")
+      ->type_name("IF");
+  verb->add_option("--domain", words->domain, "DDS domain (ROS_DOMAIN_ID); default 0")->type_name("N")->check(CLI::Range(0, 232));
+  verb->add_option("--peer", words->peers, "address to look for others at, instead of by multicast; repeatable")
+      ->type_name("ADDRESS")
+      ->allow_extra_args(false);
+  verb->add_option("--set", words->overrides, "override one setting, repeatable (lidar.voxel_size=0.2)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  verb->add_flag("--no-deskew", words->no_deskew, "take each cloud at its stamp, as if its points had been measured at once");
+  verb->callback([words, &chosen] { chosen = [words] { return live(*words); }; });
+}
+
+}  // namespace kilvo::cli

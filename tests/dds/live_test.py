@@ -1,0 +1,154 @@
+"""`kilvo live` as a robot meets it: another vendor's DDS plays a simulated walk, dies, comes back, and others disturb.
+
+No assertion is on how fast the machine is, but for generous limits."""
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+ARGUMENTS = argparse.Namespace()
+SECONDS = 6.0  # of the walk
+
+
+class Program:
+    """A child whose words are kept."""
+
+    def __init__(self, *command: str):
+        self.log = tempfile.NamedTemporaryFile("w+", suffix=".log", delete=False)
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.log, text=True)
+
+    def said(self) -> str:
+        with open(self.log.name, encoding="utf-8", errors="replace") as file:
+            return file.read()
+
+    def end(self, how: int = signal.SIGINT) -> int:
+        if self.process.poll() is None:
+            self.process.send_signal(how)
+        self.out, _ = self.process.communicate(timeout=60)
+        return self.process.returncode
+
+
+def wait_until(true, seconds: float = 30) -> bool:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if true():
+            return True
+        time.sleep(0.05)
+    return False
+
+
+class Story:
+    def __init__(self, folder: str):
+        self.folder, self.domain = folder, str(random.SystemRandom().randrange(20, 200))
+        self.walk = os.path.join(folder, "walk")
+        run(ARGUMENTS.kilvo, "simulate", "room", "--seed", "3", "--duration", str(SECONDS), "--out", self.walk, "--quiet")
+        self.bag, self.config = os.path.join(self.walk, "recording.bag"), os.path.join(self.walk, "config.yaml")
+
+    def live(self, *more: str) -> Program:
+        live = Program(ARGUMENTS.kilvo, "live", "--config", self.config, "--domain", self.domain, "--peer", "127.0.0.1", "--interface", "lo",
+                       "--set", "camera.topic=''", "--set", f"live.map_file={self.folder}/map.ply", *more)
+        if not wait_until(lambda: "odometry of" in live.said()):
+            raise AssertionError(live.said())
+        return live
+
+    def peer(self, *words: str) -> Program:
+        return Program(ARGUMENTS.peer, *words)
+
+    def play(self, *more: str) -> Program:
+        return self.peer("play", self.bag, self.domain, *more)
+
+    def listen(self, name: str, seconds: float) -> Program:
+        return self.peer("listen", self.domain, os.path.join(self.folder, name), str(seconds))
+
+
+def run(*command: str) -> str:
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+STORY: Story
+
+
+class LiveTest(unittest.TestCase):
+    def heard(self, listener: Program) -> dict:
+        listener.process.wait(120)
+        listener.end()
+        return json.loads(listener.out)
+
+    def error_of(self, name: str) -> float:
+        """m: of the odometry against the truth; stamps are those of today, so the walk is found by its own shape."""
+        return json.loads(run(sys.executable, os.path.join(os.path.dirname(__file__), "shifted_error.py"), os.path.join(STORY.folder, name),
+                              os.path.join(STORY.walk, "gt.tum")))["rmse"]
+
+    def test_a_walk_comes_in_and_the_results_go_out(self):
+        live = STORY.live("--set", "live.base=imu")
+        listener = STORY.listen("walk.tum", SECONDS + 3)
+        time.sleep(0.5)
+        player = STORY.play()
+        player.process.wait(60)
+        heard = self.heard(listener)
+        self.assertEqual(live.end(), 0, live.said())
+        self.assertGreater(heard["odometry"], 300, live.said())
+        self.assertGreater(heard["smooth"], 300)
+        self.assertGreater(heard["transforms"], 50)
+        self.assertGreater(heard["clouds"], 10)
+        self.assertGreater(heard["contacts"], 300)
+        self.assertGreater(heard["diagnostics"], 3)
+        self.assertGreater(heard["paths"], 1)
+        self.assertLess(self.error_of("walk.tum"), 0.06)
+        self.assertIn("KILV", live.said().replace("KIL (", "KILV ("))
+
+    def test_b_peers_die_come_back_and_disturb(self):
+        live = STORY.live()
+        disturbers = [STORY.peer(what, STORY.domain, "8") for what in ("garbage", "wrong-type", "picky")]
+        player = STORY.play("--only", "imu,legs")
+        self.assertTrue(wait_until(lambda: "KI (" in live.said()), live.said())
+        player.end(signal.SIGKILL)
+        self.assertTrue(wait_until(lambda: "lost: imu" in live.said()), live.said())
+        again = STORY.play("--only", "imu,legs")
+        listener = STORY.listen("again.tum", 4)
+        self.assertGreater(self.heard(listener)["odometry"], 100, live.said())
+        again.end(signal.SIGKILL)
+        for disturber in disturbers:
+            disturber.end()
+        self.assertEqual(live.end(), 0, live.said())
+        self.assertIn("/lidar: a publisher sends sensor_msgs/LaserScan, but the sensor lidar needs sensor_msgs/PointCloud2", live.said())
+        self.assertIn("/kilvo/odometry: a subscriber asks for another durability", live.said())
+
+    def test_c_a_low_state_finds_its_time(self):
+        live = STORY.live("--set", "legs.topic=rt/lowstate", "--set", "legs.clock=estimated", "--set", "legs.gyro_link=pelvis", "--set",
+                          "legs.rate=500")
+        listener = STORY.listen("low.tum", SECONDS + 3)
+        time.sleep(0.5)
+        STORY.play("--legs", "lowstate").process.wait(60)
+        heard = self.heard(listener)
+        self.assertEqual(live.end(), 0, live.said())
+        self.assertGreater(heard["contacts"], 200, live.said())
+        self.assertGreater(heard["odometry"], 300)
+
+    def test_d_what_cannot_be_is_refused(self):
+        for words, text in ((("--interface", "no_such_interface"), "cannot be entered"), (("--set", "live.base=tail"), "nearest is")):
+            program = Program(ARGUMENTS.kilvo, "live", "--config", STORY.config, "--domain", STORY.domain, *words)
+            program.process.wait(30)
+            self.assertEqual(program.end(), 2, program.said())
+            self.assertIn(text, program.said())
+
+
+def main() -> int:
+    global STORY
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--kilvo", required=True)
+    parser.add_argument("--peer", required=True)
+    rest = parser.parse_known_args(namespace=ARGUMENTS)[1]
+    with tempfile.TemporaryDirectory() as folder:
+        STORY = Story(folder)
+        return 0 if unittest.main(argv=[sys.argv[0], *rest], exit=False).result.wasSuccessful() else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
