@@ -20,8 +20,8 @@ def run(*command: str) -> str:
 def check_installed(prefix: str) -> list[str]:
     headers = [os.path.relpath(path, os.path.join(prefix, "include"))
                for path in glob.glob(os.path.join(prefix, "include/**/*.*"), recursive=True)]
-    faults = [f"{header} is installed, only headers of kilvo/ should be" for header in headers
-              if not header.startswith("kilvo/") or not header.endswith(".hpp")]
+    faults = [f"{header} is installed, only headers of kilvo/, and of the components, should be" for header in headers
+              if not header.startswith(("kilvo/", "kilvo-live/")) or not header.endswith(".hpp")]
     faults += [f"{header} is not installed" for header in
                (os.path.relpath(path, ROOT) for path in glob.glob(os.path.join(ROOT, "kilvo/*/*.hpp"))) if header not in headers]
     for path in glob.glob(os.path.join(prefix, "**/*.cmake"), recursive=True):
@@ -45,6 +45,8 @@ def main() -> None:
         run("cmake", "-S", HERE, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", *[f"-D{setting}" for setting in options.settings])
         run("cmake", "--build", build)
         print(run(os.path.join(build, "consumer")), end="")
+        if os.path.exists(live := os.path.join(build, "live_consumer")):
+            print(run(live, os.path.join(prefix, "share/kilvo/config/robots/sim.yaml")), end="")
     for fault in faults:
         print(fault)
     sys.exit(1 if faults else 0)
