@@ -13,8 +13,6 @@ namespace {
 // A new epoch begins when a variance has changed by this factor, so their number grows with the logarithm of the uncertainty.
 constexpr double change = 1.25;
 constexpr std::size_t max_epochs = 65536;
-// What planes that are not quite planes cost where all directions are held equally, m.
-constexpr double plane_error = 0.00015;
 // What surfaces that are not quite where the map has them do to the length of a way that only images measure.
 constexpr double scale_error = 1e-3;
 
@@ -68,7 +66,8 @@ std::uint32_t MapError::epoch_now(const SE3& T_WI, const PoseCovariance& P) {
   return static_cast<std::uint32_t>(epochs_.size() - 1);
 }
 
-void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak) {
+void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic,
+                          const PoseCovariance& weak) {
   PoseCovariance A = PoseCovariance::Zero();
   for (const EpochInformation& e : epochs) A += e.A;
   if (!(A.topLeftCorner<3, 3>().trace() > 0) || !(A.bottomRightCorner<3, 3>().trace() > 0)) return;
@@ -76,13 +75,8 @@ void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epo
   const PoseCovariance G = from_origin(T_WI);
   PoseCovariance root = PoseCovariance::Zero();
   for (const EpochInformation& e : epochs) root += inverse * e.A * root_of(G * epochs_[e.epoch] * G.transpose());
-  // Planes that are not quite planes move the pose most along the directions that few of them hold.
-  const Eigen::Matrix3d variance_scale =
-      (A.bottomRightCorner<3, 3>().trace() / 3.0) * inverse.bottomRightCorner<3, 3>();  // 1 where all are held equally
-  PoseCovariance systematic = PoseCovariance::Zero();
-  systematic.bottomRightCorner<3, 3>() = plane_error * plane_error * variance_scale * variance_scale;
   const PoseCovariance H = to_origin(T_WI);
-  now_ = H * (root * root.transpose() + systematic + weak * at(T_WI) * weak.transpose()) * H.transpose();
+  now_ = H * (root * root.transpose() + inverse * systematic * inverse + weak * at(T_WI) * weak.transpose()) * H.transpose();
 }
 
 void MapError::registered_to_given(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic,

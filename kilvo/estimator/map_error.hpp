@@ -24,7 +24,8 @@ class MapError {
   /// A sweep was registered with these informations against planes of each epoch; D becomes what their errors do to the pose. They
   /// are taken as fully correlated, which bounds it from above. Along directions that the sweep did not know (`weak`: a pose error
   /// to its part along them) D stays what it was.
-  void registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& weak);
+  /// `systematic`: LidarModel::systematic().
+  void registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic, const PoseCovariance& weak);
 
   /// The same with a map that was given, whose planes are where they should be. `systematic`: LidarModel::systematic().
   void registered_to_given(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic,

@@ -19,7 +19,7 @@ TEST(MapError, ASweepAgainstPlanesOfOneEpochHasTheirError) {
   MapError error;
   const PoseCovariance inserted = diagonal(1e-6, 1e-2);
   const std::uint32_t epoch = error.epoch_now(somewhere, inserted);
-  error.registered(somewhere, std::vector<EpochInformation>{{epoch, diagonal(1e7, 1e6)}}, PoseCovariance::Zero());
+  error.registered(somewhere, std::vector<EpochInformation>{{epoch, diagonal(1e7, 1e6)}}, PoseCovariance::Zero(), PoseCovariance::Zero());
   EXPECT_LT((error.at(somewhere) - inserted).norm(), 1e-4 * inserted.norm());
 }
 
@@ -27,7 +27,7 @@ TEST(MapError, TurnsOverTheDistanceToWhereThePlanesWereMade) {
   MapError error;
   const std::uint32_t epoch = error.epoch_now({}, diagonal(1e-4, 1e-12));
   const SE3 away = {SO3(), {10, 0, 0}};
-  error.registered(away, std::vector<EpochInformation>{{epoch, diagonal(1e7, 1e6)}}, PoseCovariance::Zero());
+  error.registered(away, std::vector<EpochInformation>{{epoch, diagonal(1e7, 1e6)}}, PoseCovariance::Zero(), PoseCovariance::Zero());
   EXPECT_NEAR(error.at(away)(4, 4), 100 * 1e-4, 1e-5) << "0.01 rad at 10 m";
   EXPECT_NEAR(error.at(away)(3, 3), 0, 1e-5);
 }
@@ -37,23 +37,23 @@ TEST(MapError, OldPlanesBringBackTheirSmallError) {
   const std::uint32_t old = error.epoch_now(somewhere, diagonal(1e-8, 1e-6));
   const std::uint32_t late = error.epoch_now(somewhere, diagonal(1e-8, 1.0));
   ASSERT_NE(old, late);
-  error.registered(somewhere, std::vector<EpochInformation>{{late, diagonal(1e7, 1e6)}}, PoseCovariance::Zero());
+  error.registered(somewhere, std::vector<EpochInformation>{{late, diagonal(1e7, 1e6)}}, PoseCovariance::Zero(), PoseCovariance::Zero());
   EXPECT_NEAR(error.at(somewhere)(3, 3), 1.0, 1e-2);
-  error.registered(somewhere, std::vector<EpochInformation>{{old, diagonal(1e7, 1e6)}}, PoseCovariance::Zero());
+  error.registered(somewhere, std::vector<EpochInformation>{{old, diagonal(1e7, 1e6)}}, PoseCovariance::Zero(), PoseCovariance::Zero());
   EXPECT_LT(error.at(somewhere)(3, 3), 2e-6);
 }
 
 TEST(MapError, KeepsItsErrorAlongADirectionThatASweepDoesNotKnow) {
   MapError error;
   const std::uint32_t late = error.epoch_now({}, diagonal(1e-8, 1.0));
-  error.registered({}, std::vector<EpochInformation>{{late, diagonal(1e7, 1e6)}}, PoseCovariance::Zero());
+  error.registered({}, std::vector<EpochInformation>{{late, diagonal(1e7, 1e6)}}, PoseCovariance::Zero(), PoseCovariance::Zero());
   PoseCovariance weak = PoseCovariance::Zero();
   weak(3, 3) = 1;
   PoseCovariance blind_along_x = diagonal(1e7, 1e6);
   blind_along_x(3, 3) = 0;
   MapError fresh = error;
   const std::uint32_t old = fresh.epoch_now({}, diagonal(1e-8, 1e-6));
-  fresh.registered({}, std::vector<EpochInformation>{{old, blind_along_x}}, weak);
+  fresh.registered({}, std::vector<EpochInformation>{{old, blind_along_x}}, PoseCovariance::Zero(), weak);
   EXPECT_NEAR(fresh.at({})(3, 3), 1.0, 1e-2);
 }
 

@@ -39,7 +39,7 @@ void Estimator::rebase(const Estimate& e) {
 // The map grows by what a sweep saw, and takes over how uncertain the pose was.
 void Estimator::learn(const LidarModel& model, const std::vector<PointCluster>& clusters, bool registered) {
   const SE3 T_WI = estimate_->x.pose();
-  if (registered) map_error_.registered(T_WI, model.by_epoch(), unobservable_);
+  if (registered) map_error_.registered(T_WI, model.by_epoch(), model.systematic(), unobservable_);
   const std::uint32_t epoch = map_error_.epoch_now(T_WI, estimate_->P.topLeftCorner<6, 6>());
   const std::vector<PointGroup> seen = to_world(clusters, T_WI, robot_.lidar.T_imu_lidar.p, config_.lidar);
   map_.insert(seen, epoch);

@@ -220,22 +220,34 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
 }
 
 PoseCovariance LidarModel::systematic() const {
-  std::vector<int> rows(map_.node_capacity(), 0);
-  for (const Association& a : associations_) {
-    if (a.plane != nullptr) ++rows[a.node];
-  }
-  PoseCovariance M = PoseCovariance::Zero();
-  Eigen::Matrix<double, 6, 1> pull = Eigen::Matrix<double, 6, 1>::Zero();
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  constexpr std::uint32_t none = 0xffffffff;
+  struct OfPlane {
+    Vector6 pull = Vector6::Zero();  // of its own error on b
+    PoseCovariance bumps = PoseCovariance::Zero();
+    int rows = 0;
+  };
+  std::vector<std::uint32_t> index_of_node(map_.node_capacity(), none);
+  std::vector<OfPlane> planes;
+  Vector6 pull = Vector6::Zero();
   for (std::size_t i = 0; i < associations_.size(); ++i) {
     const Association& a = associations_[i];
     if (a.plane == nullptr) continue;
-    const double bump = std::max(1.0, rows[a.node] / bumps_of_a_plane);
-    add_outer(M, a.row.J, a.weight * a.weight * bump * static_cast<double>(a.plane->roughness_variance));
+    std::uint32_t& index = index_of_node[a.node];
+    if (index == none) {
+      index = static_cast<std::uint32_t>(planes.size());
+      planes.emplace_back();
+    }
+    OfPlane& plane = planes[index];
+    ++plane.rows;
+    plane.pull += a.weight * std::sqrt(a.plane_variance) * a.row.J;
+    add_outer(plane.bumps, a.row.J, a.weight * a.weight * static_cast<double>(a.plane->roughness_variance));
     // A point that is alone in its cell weighs as it does itself.
     const double count = clusters_[i].count, together = 1 - 1 / count;
     pull += a.weight * together * pull_of_noise(a.n_I, clusters_[i].mean.cast<double>() - p_IL_, a.variance * count, config_) * a.row.J;
   }
-  M += pull * pull.transpose();
+  PoseCovariance M = pull * pull.transpose();
+  for (const OfPlane& plane : planes) M += plane.pull * plane.pull.transpose() + std::max(1.0, plane.rows / bumps_of_a_plane) * plane.bumps;
   const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
   return known.transpose() * M.selfadjointView<Eigen::Lower>() * known;
 }

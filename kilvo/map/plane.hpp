@@ -55,7 +55,7 @@ struct Plane {
 
 struct PlaneConfig {
   double min_points = 8;        // fewer never make a plane
-  double max_roughness = 0.03;  // m; standard deviation beyond the measurement noise above which a surface is no plane
+  double max_roughness = 0.01;  // m; standard deviation beyond the measurement noise above which a surface is no plane
 };
 
 /// The plane through points with these moments around `origin`, if they lie on one: their thickness is what measurement noise and

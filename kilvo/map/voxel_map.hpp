@@ -18,7 +18,7 @@ namespace kilvo {
 struct MapConfig {
   double voxel_size = 1.0;  // m
   double min_points = 8;
-  double max_roughness = 0.03;  // m
+  double max_roughness = 0.01;  // m
   double full_points = 2000;
   double radius = 120;  // m
   int max_nodes = 600000;
