@@ -1,13 +1,8 @@
 #include "apps/node/map_thread.hpp"
 
-<<<<<<< HEAD:apps/ros1/map_thread.cpp
-#include <ros/names.h>
 #include <utility>
 
-#include "apps/ros1/clouds.hpp"
-=======
 #include "apps/node/clouds.hpp"
->>>>>>> 9d7c7fa (node: what a node does without its middleware; the base may be any link):apps/node/map_thread.cpp
 #include "lab/mapping/ply.hpp"
 
 namespace kilvo::node {

@@ -1,6 +1,7 @@
 #include "apps/node/state_publisher.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace kilvo::node {
 namespace {
@@ -36,6 +37,7 @@ StatePublisher::StatePublisher(const Options& options, const lab::Settings& sett
 }
 
 void StatePublisher::take(const Output& output) {
+  if (std::exchange(epoch_, output.epoch) != output.epoch) clear();
   const auto base = base_.newest();
   const BodyMotion best = body_motion(output, base ? base->base : LinkMotion{}, rate_variance_);
   note(output, best);
