@@ -26,15 +26,13 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME kilvo)
-set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "odometry for humanoid robots from legs, IMU, LiDAR and camera
- The program kilvo reads recordings, estimates the trajectory of the robot,
- which foot stands, and a coloured map, compares them with the truth and
- shows them as a page for the browser. A simulated robot is included.")
+set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "The program kilvo reads recordings, estimates the trajectory of the robot,
+which foot stands, and a coloured map, compares them with the truth and
+shows them as a page for the browser. A simulated robot is included.")
 set(CPACK_DEBIAN_ROS1_PACKAGE_NAME kilvo-ros1)
 set(CPACK_DEBIAN_ROS1_PACKAGE_DEPENDS "kilvo (= ${PROJECT_VERSION})")
-set(CPACK_COMPONENT_ROS1_DESCRIPTION "odometry for humanoid robots: node for ROS 1
- The node kilvo_node listens to joint encoders, IMU, LiDAR and camera and
- publishes odometry, transforms, clouds, contacts and diagnostics.")
+set(CPACK_COMPONENT_ROS1_DESCRIPTION "The node kilvo_node for ROS 1 listens to joint encoders, IMU, LiDAR and
+camera and publishes odometry, transforms, clouds, contacts and diagnostics.")
 
 # What Debian asks of every package: copyright and changelog.
 file(WRITE ${CMAKE_BINARY_DIR}/copyright "Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
