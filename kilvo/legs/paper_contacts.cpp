@@ -9,8 +9,8 @@ using std::chrono::milliseconds;
 
 // How long the still start is recorded for S_st.
 constexpr Duration still_time = milliseconds(500);
-// What lasted shorter or longer than this was no swing of a step: S_sw waits for the next one. The paper has no such bounds; without them
-// a jolt of some milliseconds becomes the reference for good.
+// What lasted shorter or longer than this, or did not rise and come down more than the other foot, was no swing of a step: S_sw waits for
+// the next one. The paper has no such bounds; without them a jolt of some milliseconds becomes the reference for good.
 constexpr Duration shortest_swing = milliseconds(100), longest_swing = milliseconds(1000);
 // Before the swing time is known.
 constexpr Duration first_window = milliseconds(400);
@@ -92,9 +92,6 @@ void PaperContactEstimator::lift_off(std::size_t side, Time t) {
   contacts_.on[side] = false;
   contacts_.since[side] = t;
   if (initialised()) return;
-  // With both feet in the air no foot supports: that is no first step.
-  first_swing_.reset();
-  if (!contacts_.on[1 - side]) return;
   first_swing_ = side;
   learning_ = {};
 }
@@ -105,7 +102,7 @@ void PaperContactEstimator::touchdown(std::size_t side, Time t, const FootMotion
   const Duration swing = t - contacts_.since[side];
   if (first_swing_ == side) {
     first_swing_.reset();
-    if (swing >= shortest_swing && swing <= longest_swing) {
+    if (swing >= shortest_swing && swing <= longest_swing && has_larger_area(side)) {
       swing_ = learning_;
       swing_time_ = swing;
     }
@@ -169,7 +166,9 @@ const Contacts& PaperContactEstimator::update(const Feet& feet, const State& x, 
     if (still) continue;
     if (contacts_.on[side]) {
       f.settled = f.settled || f.calm.update(contacts_.d_a < theta_d, feet.t) || !initialised();
-      if (f.moving.update(d_fv > theta_d, feet.t) && f.settled) lift_off(side, feet.t);
+      // In the first step one foot supports: what it does meanwhile is S_sw.
+      const bool may_lift = f.settled && (initialised() || contacts_.on[1 - side]);
+      if (f.moving.update(d_fv > theta_d, feet.t) && may_lift) lift_off(side, feet.t);
     } else if (lands(side, impact, d_fv, feet.t)) {
       touchdown(side, feet.t, m, x, map);
     }
