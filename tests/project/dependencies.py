@@ -22,6 +22,8 @@ LANGUAGE = re.compile(r"libstdc\+\+-\d+-dev|libgcc-\d+-dev|libc6-dev|linux-libc-
 HEADER_FOLDERS = [*sorted(glob.glob("/usr/include/c++/*"), reverse=True), *sorted(glob.glob("/usr/lib/gcc/*/*/include"), reverse=True),
                   *glob.glob("/usr/include/*-linux-gnu"), "/usr/include", "/usr/include/eigen3"]
 SKIPPED = 77
+# Compiled in a workspace of ROS 2, which Debian does not have.
+NOT_DEBIAN = "apps/ros2/"
 
 
 def packages(root: str, *options: str) -> list[str]:
@@ -42,10 +44,13 @@ def owners(paths: list[str]) -> dict[str, str]:
 def headers(root: str) -> dict[str, str]:
     """Each header included in <> that is no file of the project, and one place that includes it."""
     places = {}
+    generated = {os.path.basename(path).removesuffix(".idl") + ".h" for path in glob.glob(os.path.join(root, "apps/**/*.idl"), recursive=True)}
     for path in cpp_text.sources(root):
+        if path.startswith(NOT_DEBIAN):
+            continue
         text = cpp_text.without_comments(cpp_text.read(root, path), keep_strings=True)
         for match in re.finditer(r"^[ \t]*#[ \t]*include[ \t]*<([^>\n]+)>", text, re.M):
-            if not os.path.exists(os.path.join(root, match[1])):
+            if not os.path.exists(os.path.join(root, match[1])) and match[1] not in generated:
                 places.setdefault(match[1], f"{path}:{text.count(chr(10), 0, match.start()) + 1}")
     return places
 
