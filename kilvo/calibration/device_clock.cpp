@@ -20,7 +20,8 @@ Time DeviceClock::follow(std::optional<Duration> device, Time arrived) {
   bool counted = false;
   if (device && device_) {
     const double advance = to_seconds(*device - *device_);
-    counted = advance > 0 && std::abs(advance - passed) < longest_surprise;
+    // Messages may overtake each other.
+    counted = advance != 0 && std::abs(advance - passed) < longest_surprise;
     if (counted) step = advance;
   }
   const Time predicted = time_ + from_seconds(step);
@@ -30,9 +31,9 @@ Time DeviceClock::follow(std::optional<Duration> device, Time arrived) {
     count_ = 1;
   } else {
     ++count_;
-    const double share = std::max(1.0 / static_cast<double>(count_), std::min(1.0, step / (counted ? counted_memory : uncounted_memory)));
-    // Time never goes back.
-    time_ = std::max(predicted + from_seconds(share * surprise), time_ + Duration(1000));
+    const double share =
+        std::max(1.0 / static_cast<double>(count_), std::min(1.0, period_ / (counted ? counted_memory : uncounted_memory)));
+    time_ = predicted + from_seconds(share * surprise);
   }
   device_ = device;
   arrived_ = arrived;

@@ -9,8 +9,9 @@ namespace {
 
 // Differences this far apart in time are taken as independent, s.
 constexpr double independent = 0.01;
-// An offset is found when every other one, but its neighbours, leaves so many times more of the rates unexplained; over so many samples.
-constexpr double distinct = 3, enough = 60;
+// An offset is found when every other one, but its neighbours, is less likely by this (difference of the logarithms; errors of neighbouring
+// samples are alike, so it is large), over so many samples at least.
+constexpr double certain = 200, enough = 60;
 constexpr int neighbours = 8;              // steps of the grid
 constexpr double forgetting = 1.0 / 1000;  // of what the grid has seen, a sample
 // How an offset wanders: delays change by a tenth of a millisecond in a second.
@@ -115,11 +116,12 @@ void RateOffset::decide() {
   for (int k = 0; k <= 2 * most; ++k) {
     if (std::abs(k - static_cast<int>(best)) > neighbours) others = std::min(others, squares_[static_cast<std::size_t>(k)]);
   }
-  if (!(others > distinct * squares_[static_cast<std::size_t>(best)])) return;
+  const double variance = squares_[static_cast<std::size_t>(best)] / (3 * samples_);  // of each axis
+  if (!(others - squares_[static_cast<std::size_t>(best)] > 2 * certain * variance)) return;
   is_found_ = true;
   offset_ = (static_cast<double>(best) - most) * step;
   variance_ = first_sigma * first_sigma;
-  noise_ = squares_[static_cast<std::size_t>(best)] / (3 * samples_);
+  noise_ = variance;
 }
 
 // other(t) = reference(t + offset): what is left over is the slope times what the offset is wrong by.

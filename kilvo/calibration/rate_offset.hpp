@@ -1,5 +1,5 @@
 // By how much the clocks of two angular rates of one body differ: one is the other, later or earlier. First every offset of a grid is tried
-// on the same samples; when one of them explains what the others do not, a Kalman filter follows it.
+// on the same samples; when one of them is far likelier than the others, a Kalman filter follows it.
 #pragma once
 
 #include <Eigen/Core>
