@@ -33,12 +33,14 @@ void tell(const fs::path& folder, const fs::path& results, const lab::Evaluation
   fmt::print("  position error      {:.1f} mm rms, {:.1f} mm at most; orientation {:.3f} degrees rms\n", 1e3 * e.ate_rmse_m,
              1e3 * e.ate_max_m, e.rotation_rmse_deg);
   fmt::print("  drift from start to end  {:.1f} mm\n", 1e3 * e.e2e_m);
-  if (contacts.walks) fmt::print("  feet on the ground  {:.1f} % of the time told right, without force sensors\n", 100 * contacts.accuracy);
+  if (contacts.walks)
+    fmt::print("  feet on the ground  {:.1f} % of the time reported right, without force sensors\n", 100 * contacts.accuracy);
   fmt::print("Look at:\n");
   fmt::print("  {}  pictures of all of it, for a browser\n", (results / "report.html").string());
   fmt::print("  {}  the map, for MeshLab or CloudCompare\n", (results / "map.ply").string());
   fmt::print("  {}  everything about the run, its times among it\n", (results / "summary.json").string());
   fmt::print("Again by hand: kilvo run {} --out {}\n", folder.string(), results.string());
+  fmt::print("The picture: file://{}\n", fs::absolute(results / "report.html").lexically_normal().string());
 }
 
 int demo(const DemoOptions& options) {
