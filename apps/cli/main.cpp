@@ -34,6 +34,7 @@ int parse_and_do(const std::vector<std::string>& words) {
   add_run(program, chosen);
   add_live(program, chosen);
   add_info(program, chosen);
+  add_doctor(program, chosen);
   add_eval(program, chosen);
   add_compare(program, chosen);
   add_eval_contacts(program, chosen);

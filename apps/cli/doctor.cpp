@@ -1,0 +1,120 @@
+// kilvo doctor INPUT --config FILE
+#include <filesystem>
+#include <fmt/core.h>
+#include <fstream>
+#include <memory>
+#include <sstream>
+
+#include "apps/cli/exit_code.hpp"
+#include "apps/cli/output_folder.hpp"
+#include "apps/cli/sensor_choice.hpp"
+#include "apps/cli/shipped_config.hpp"
+#include "apps/cli/verbs.hpp"
+#include "lab/doctor/diagnosis_text.hpp"
+#include "lab/doctor/examination.hpp"
+#include "lab/messages/input_error.hpp"
+#include "lab/recordings/recording_source.hpp"
+#include "lab/settings/edit_settings.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct DoctorOptions {
+  std::string input, config, write;
+  std::vector<std::string> overrides;
+  double start = 0, duration = 60;
+  bool json = false;
+};
+
+lab::RecordingOptions recording_options(const DoctorOptions& options, const lab::Settings& settings, const std::vector<Sensor>& used) {
+  const Robot& robot = settings.robot;
+  const double rates[] = {robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate};
+  const double offsets[] = {robot.imu.time_offset, robot.legs.time_offset, robot.lidar.time_offset, robot.camera.time_offset};
+  lab::RecordingOptions out;
+  out.start = options.start;
+  out.duration = options.duration;
+  for (const Sensor sensor : used) {
+    const auto i = static_cast<std::size_t>(sensor);
+    out[sensor] = {true, settings.topic(sensor), rates[i], offsets[i]};
+  }
+  return out;
+}
+
+lab::Recorded record(const DoctorOptions& options, lab::RecordingOptions wanted) {
+  const auto read = [&options](const lab::RecordingOptions& what) {
+    lab::RecordingSource source(options.input, what);
+    lab::Recorder recorder;
+    while (const auto measurement = source.next()) recorder.push(*measurement);
+    return recorder.finish();
+  };
+  if (!wanted[Sensor::lidar].use) return read(wanted);
+  try {
+    return read(wanted);
+  } catch (const lab::InputError&) {
+    // Clouds without point times are a finding, not the end.
+    wanted.no_deskew = true;
+    return read(wanted);
+  }
+}
+
+std::string text_of(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return std::move(text).str();
+}
+
+/// The configuration with what the findings say put right; everything else as it is.
+void write_corrected(const fs::path& from, const fs::path& to, const lab::Settings& settings, const lab::Diagnosis& diagnosis) {
+  std::string text = text_of(from);
+  std::size_t changes = 0;
+  for (const lab::Finding& finding : diagnosis.findings) {
+    if (finding.changes.empty()) fmt::print(stderr, "kilvo: not changed by --write: {}: {}\n", name_of(finding.sensor), finding.remedy);
+    for (const lab::Change& change : finding.changes) {
+      text = lab::with_setting(text, change.key, change.value);
+      ++changes;
+    }
+  }
+  // A relative path means one from the configuration's own folder.
+  const bool elsewhere = fs::weakly_canonical(fs::absolute(to)).parent_path() != fs::weakly_canonical(fs::absolute(from)).parent_path();
+  if (elsewhere && settings.given.contains("robot.urdf")) text = lab::with_setting(text, "robot.urdf", settings.urdf_file);
+  write_text_file(to, text);
+  fmt::print(stderr, "kilvo: {} with {} setting{} changed\n", to.string(), changes, changes == 1 ? "" : "s");
+}
+
+int doctor(const DoctorOptions& options) {
+  const auto config = config_file(options.config.empty() ? std::nullopt : std::optional(options.config), options.input);
+  const lab::Settings settings = lab::load_settings(config, options.overrides);
+  const SensorChoice choice = choose_sensors(std::nullopt, settings, config.string(), options.input);
+  for (const std::string& text : choice.warnings) fmt::print(stderr, "kilvo: warning: {}\n", text);
+  const lab::Recorded recorded = record(options, recording_options(options, settings, choice.used));
+  lab::Examination examination(recorded, settings.robot);
+  const lab::Diagnosis diagnosis = examination.run();
+  fmt::print("{}", options.json ? lab::to_json(diagnosis) : lab::to_text(diagnosis));
+  if (!options.write.empty()) write_corrected(config, options.write, settings, diagnosis);
+  if (!diagnosis.good()) return run_failed;
+  return diagnosis.unknown() ? unusable_input : done;
+}
+
+}  // namespace
+
+void add_doctor(CLI::App& program, Action& chosen) {
+  auto options = std::make_shared<DoctorOptions>();
+  CLI::App* verb = program.add_subcommand("doctor", "judge the description of a robot by a recording");
+  verb->add_option("INPUT", options->input, "ROS 1 bag, or a folder with recording.bag in it")->required();
+  verb->add_option("--config", options->config,
+                   "the description; default: config.yaml in INPUT if that is a folder, else the shipped robots/g1.yaml")
+      ->type_name("FILE");
+  verb->add_option("--write", options->write, "write the configuration there with what was found put right")->type_name("FILE");
+  verb->add_option("--set", options->overrides, "override one setting, repeatable (lidar.time_offset=0.005)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  verb->add_option("--start", options->start, "begin this many seconds into the recording")->type_name("S");
+  verb->add_option("--duration", options->duration, "look at so many seconds; default: 60")->type_name("S");
+  verb->add_flag("--json", options->json, "print one JSON object");
+  verb->callback([options, &chosen] { chosen = [options] { return doctor(*options); }; });
+}
+
+}  // namespace kilvo::cli

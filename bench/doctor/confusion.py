@@ -1,0 +1,252 @@
+#!/usr/bin/python3
+"""Wrong descriptions of a robot that `kilvo doctor` must find, and how often it names the right culprit.
+
+  confusion.py KILVO RECORDING CONFIG [--only TEXT] [--work DIR] [--data]
+
+Each case changes the right configuration (or, with --data, the messages: needs python3-rosbag) in one place, runs `kilvo doctor --json`
+and compares the findings with what was done. Exit status 1 when a culprit is not named, another one is, or the right description is
+accused."""
+import argparse
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+import yaml
+
+
+def rotation(axis, degrees):
+    a = math.radians(degrees)
+    c, s = math.cos(a), math.sin(a)
+    return {"x": np.array([[1, 0, 0], [0, c, -s], [0, s, c]]), "y": np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]),
+            "z": np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])}[axis]
+
+
+def pose(node):
+    return np.array(node["R"], float).reshape(3, 3), np.array(node["p"], float)
+
+
+def texts(key, R=None, p=None):
+    out = []
+    if R is not None:
+        out.append(f"{key}.R=[{', '.join(repr(float(x)) for x in np.asarray(R).flatten())}]")
+    if p is not None:
+        out.append(f"{key}.p=[{', '.join(repr(float(x)) for x in p)}]")
+    return out
+
+
+def scaled_urdf(text, link, factor):
+    """The origins of the joints whose parent is `link`, scaled."""
+    def change(joint):
+        if not re.search(r'<parent\s+link="%s"' % link, joint.group(0)):
+            return joint.group(0)
+        return re.sub(r'(<origin[^>]*xyz=")([^"]+)"', lambda m: m.group(1) + " ".join(f"{factor * float(x):.9g}" for x in m.group(2).split()) + '"', joint.group(0))
+    return re.sub(r"<joint .*?</joint>", change, text, flags=re.S)
+
+
+def description_cases(config, folder, work):
+    """name, overrides of the configuration, causes of which one is right"""
+    out = [("right", [], [])]
+    if "lidar" in config:
+        R, p = pose(config["lidar"]["T_imu_lidar"])
+        key = "lidar.T_imu_lidar"
+        for name, axis, degrees in (("rolled by 180", "x", 180), ("yawed by 90", "z", 90), ("pitched by 1", "y", 1), ("pitched by 5", "y", 5), ("pitched by 20", "y", 20)):
+            out.append((f"LiDAR {name}", texts(key, R @ rotation(axis, degrees)), ["lidar_rotation"]))
+        if np.linalg.norm(R.T @ R.T - np.eye(3)) > 1e-6 or np.linalg.norm(p) > 0.03:
+            out.append(("LiDAR inverted", texts(key, R.T, -R.T @ p), ["lidar_inverted", "lidar_position"]))
+        out.append(("LiDAR moved by 10 cm", texts(key, p=p + [0.1, 0, 0]), ["lidar_position"]))
+        out.append(("LiDAR moved by 10 cm up", texts(key, p=p + [0, 0, -0.1]), ["lidar_position"]))
+        out.append(("LiDAR position in mm", texts(key, p=1000 * p), ["lidar_position", "lidar_unit"]))
+        for ms in (5, -20, 100, 1000):
+            out.append((f"LiDAR clock {ms} ms", [f"lidar.time_offset={ms / 1000}"], ["lidar_clock"]))
+        out.append(("LiDAR rate", ["lidar.rate=20"], ["lidar_rate"]))
+    if "legs" in config and config["legs"].get("type", "joints") == "joints":
+        R, p = pose(config["imu"]["T_link_imu"])
+        key = "imu.T_link_imu"
+        for ms in (20, -100, 1000):
+            out.append((f"legs' clock {ms} ms", [f"legs.time_offset={ms / 1000}"], ["legs_clock"]))
+        out.append(("IMU turned by 5 on its link", texts(key, rotation("y", 5) @ R), ["imu_mount_rotation"]))
+        out.append(("IMU turned by 90 on its link", texts(key, rotation("z", 90) @ R), ["imu_mount_rotation"]))
+        out.append(("IMU on another link", ["imu.T_link_imu.link=" + ("left_hip_pitch_link" if "ankle" in str(config["robot"]) else "l_hip_1")], ["imu_link", "imu_mount_rotation"]))
+        feet = config["robot"]["feet"]
+        swapped = [dict(feet[0], link=feet[1]["link"]), dict(feet[1], link=feet[0]["link"])]
+        out.append(("feet swapped", ["robot.feet=" + json.dumps(swapped)], ["feet_swapped"]))
+        urdf = os.path.join(folder, config["robot"]["urdf"])
+        text = open(urdf).read()
+        for link in ("left_knee_link",):
+            if link not in text:
+                continue
+            longer = scaled_urdf(scaled_urdf(text, link, 1.1), link.replace("left", "right"), 1.1)
+            path = os.path.join(work, "shin.urdf")
+            open(path, "w").write(longer)
+            out.append(("shin 10 % longer", ["robot.urdf=" + path], ["leg_lengths"]))
+            path = os.path.join(work, "sign.urdf")
+            open(path, "w").write(re.sub(r'(<joint name="left_knee_joint".*?<axis xyz=")([^"]+)(")', lambda m: m.group(1) + " ".join(str(-float(x)) for x in m.group(2).split()) + m.group(3), text, flags=re.S))
+            out.append(("knee's sign", ["robot.urdf=" + path], ["joint_sign"]))
+            path = os.path.join(work, "hip.urdf")
+            open(path, "w").write(re.sub(r'(<joint name="right_hip_roll_joint".*?<axis xyz=")([^"]+)(")', lambda m: m.group(1) + " ".join(str(-float(x)) for x in m.group(2).split()) + m.group(3), text, flags=re.S))
+            out.append(("hip roll's sign", ["robot.urdf=" + path], ["joint_sign"]))
+        out.append(("legs' rate", ["legs.rate=200"], ["legs_rate"]))
+    for ms in (20, 300):
+        out.append((f"IMU clock {ms} ms", [f"imu.time_offset={ms / 1000}"], ["imu_clock"] if "lidar" in config else ["imu_clock", "legs_clock"]))
+    if "camera" in config:
+        R, p = pose(config["camera"]["T_imu_camera"])
+        key = "camera.T_imu_camera"
+        optical = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+        out.append(("camera in the body frame", texts(key, R @ optical.T), ["camera_frame", "camera_rotation"]))
+        out.append(("camera inverted", texts(key, R.T, -R.T @ p), ["camera_inverted", "camera_rotation"]))
+        out.append(("camera turned by 5", texts(key, R @ rotation("x", 5)), ["camera_rotation"]))
+        out.append(("camera's fx halved", [f"camera.fx={config['camera']['fx'] / 2}"], ["camera_focal"]))
+        out.append(("camera's fx and fy halved", [f"camera.fx={config['camera']['fx'] / 2}", f"camera.fy={config['camera']['fy'] / 2}"], ["camera_focal"]))
+        out.append(("camera's cx and cy swapped", [f"camera.cx={config['camera']['cy']}", f"camera.cy={config['camera']['cx']}"], ["camera_principal_point"]))
+        out.append(("camera's size", ["camera.width=1280", "camera.height=1024"], ["camera_size"]))
+        for ms in (10, 200):
+            out.append((f"camera's clock {ms} ms", [f"camera.time_offset={ms / 1000}"], ["camera_clock"]))
+    return out
+
+
+# --- faults of the messages ---------------------------------------------------------------------------------------------------------
+
+def each_imu(change):
+    def rewrite(sensor, m):
+        if sensor == "imu":
+            w = np.array([m.angular_velocity.x, m.angular_velocity.y, m.angular_velocity.z])
+            a = np.array([m.linear_acceleration.x, m.linear_acceleration.y, m.linear_acceleration.z])
+            w, a = change(w, a)
+            m.angular_velocity.x, m.angular_velocity.y, m.angular_velocity.z = w
+            m.linear_acceleration.x, m.linear_acceleration.y, m.linear_acceleration.z = a
+        return m
+    return rewrite
+
+
+def each_legs(change):
+    def rewrite(sensor, m):
+        if sensor == "legs":
+            change(m)
+        return m
+    return rewrite
+
+
+def turned(R):
+    return each_imu(lambda w, a: (R @ w, R @ a))
+
+
+def swap_sides(m):
+    m.name = [n.replace("left", "#").replace("right", "left").replace("#", "right") for n in m.name]
+
+
+def shift(m):
+    m.name = m.name[1:] + m.name[:1]
+
+
+def in_degrees(m):
+    m.position = [math.degrees(q) for q in m.position]
+    m.velocity = [math.degrees(q) for q in m.velocity]
+
+
+def reversed_times(sensor, m):
+    if sensor == "lidar":
+        field = [f for f in m.fields if f.name in ("timestamp", "time", "t", "offset_time")][0]
+        kind = {6: "<u4", 7: "<f4", 8: "<f8"}[field.datatype]
+        raw = np.frombuffer(bytearray(m.data), np.uint8).reshape(-1, m.point_step).copy()
+        size = int(kind[2])
+        t = raw[:, field.offset:field.offset + size].copy().view(kind)[:, 0]
+        t = (t.max() - t + t.min()).astype(kind)
+        raw[:, field.offset:field.offset + size] = t[:, None].view(np.uint8)
+        m.data = raw.tobytes()
+    return m
+
+
+def no_times(sensor, m):
+    if sensor == "lidar":
+        m.fields = [f for f in m.fields if f.name not in ("timestamp", "time", "t", "offset_time")]
+    return m
+
+
+def data_cases(config):
+    flip = np.diag([1.0, -1.0, 1.0])
+    out = [("accelerometer in g", each_imu(lambda w, a: (w, a / 9.80665)), ["accel_unit"]),
+           ("gyro in deg/s", each_imu(lambda w, a: (np.degrees(w), a)), ["gyro_unit"]),
+           ("IMU turned by 90", turned(rotation("z", 90)), ["imu_rotated"]),
+           ("IMU turned by 180", turned(rotation("x", 180)), ["imu_rotated"]),
+           ("IMU's y flipped", turned(flip), ["imu_axes"]),
+           ("gyro's signs flipped", each_imu(lambda w, a: (-w, a)), ["imu_axes"]),
+           ("accelerometer's signs flipped", each_imu(lambda w, a: (w, -a)), ["imu_axes"])]
+    if "legs" in config:
+        out += [("joints in degrees", each_legs(in_degrees), ["joint_unit"]), ("left and right swapped", each_legs(swap_sides), ["joints_swapped"]),
+                ("names shifted by one", each_legs(shift), ["joint_names_shifted"])]
+    if "lidar" in config:
+        out += [("point times reversed", reversed_times, ["point_times_reversed"]), ("point times absent", no_times, ["point_times_absent"])]
+    return out
+
+
+def rewrite(source, target, config, change, topics, until):
+    import rosbag
+    sensor_of = {topic: sensor for sensor, topic in topics.items()}
+    types = {"sensor_msgs/Imu": "imu", "sensor_msgs/JointState": "legs", "sensor_msgs/PointCloud2": "lidar"}
+    with rosbag.Bag(source) as bag, rosbag.Bag(target, "w") as out:
+        begin = None
+        for topic, message, t in bag.read_messages(topics=[x for x in topics.values()] + [x + "/compressed" for x in topics.values()]):
+            begin = begin or t
+            if (t - begin).to_sec() > until:
+                break
+            kind = types.get(message._type)
+            if sensor_of.get(topic) == kind:
+                message = change(kind, message)
+            out.write(topic, message, t)
+
+
+def judge(kilvo, recording, config, overrides):
+    command = [kilvo, "doctor", recording, "--config", config, "--json"]
+    for text in overrides:
+        command += ["--set", text]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode not in (0, 1, 3) or not done.stdout:
+        return None, done.stderr.strip()
+    return json.loads(done.stdout), done.stderr.strip()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("kilvo")
+    parser.add_argument("recording")
+    parser.add_argument("config")
+    parser.add_argument("--only", default="", help="only cases whose name holds this text (a regular expression)")
+    parser.add_argument("--data", action="store_true", help="faults of the messages instead of the configuration")
+    parser.add_argument("--until", type=float, default=30, help="seconds of the recording that rewritten ones keep")
+    arguments = parser.parse_args()
+    config = yaml.safe_load(open(arguments.config))
+    work = tempfile.mkdtemp(prefix="confusion-")
+    rows = []
+    if arguments.data:
+        cases = [(name, None, right, change) for name, change, right in data_cases(config)]
+    else:
+        cases = [(name, overrides, right, None) for name, overrides, right in description_cases(config, os.path.dirname(os.path.abspath(arguments.config)), work)]
+    named = accused = 0
+    for name, overrides, right, change in cases:
+        if not re.search(arguments.only, name):
+            continue
+        recording = arguments.recording
+        if change is not None:
+            recording = os.path.join(work, "case.bag")
+            topics = {s: config[s]["topic"] for s in ("imu", "legs", "lidar", "camera") if s in config}
+            source = os.path.join(arguments.recording, "recording.bag") if os.path.isdir(arguments.recording) else arguments.recording
+            rewrite(source, recording, config, change, topics, arguments.until)
+        result, error = judge(arguments.kilvo, recording, arguments.config, overrides or [])
+        found = [f["cause"] for f in result["findings"]] if result else ["refused: " + error[:120]]
+        good = any(c in right for c in found) if right else not found
+        others = [c for c in found if c not in right]
+        named += good
+        accused += bool(others)
+        rows.append((name, good, others))
+        print(f"{'ok ' if good and not others else 'NO '} {name:34} expected {'/'.join(right) or '-':40} found {', '.join(found) or '-'}", flush=True)
+    print(f"{named} of {len(rows)} named, {accused} with another accusation")
+    return 0 if named == len(rows) and accused == 0 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,209 @@
+// The camera: size of its images, rotation of its mount, focal length, principal point, clock.
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+
+#include "lab/doctor/examination.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double rotation_tolerance = 2;    // degrees
+constexpr double focal_tolerance = 0.06;    // of the focal length
+constexpr double clock_tolerance = 0.0045;  // s
+constexpr double sure = 4;                  // standard deviations
+constexpr double much_better = 0.7;         // of the error that a hypothesis may leave
+
+struct CameraHypothesis {
+  std::string cause, text, key;
+  CameraMount mount;
+  std::vector<Change> changes;
+};
+
+std::vector<CameraHypothesis> hypotheses(const CameraMount& m) {
+  std::vector<CameraHypothesis> out;
+  const auto add = [&](const char* cause, const std::string& text, const std::string& remedy, const CameraMount& mount,
+                       std::vector<Change> changes) {
+    out.push_back({cause, text, remedy, mount, std::move(changes)});
+  };
+  CameraMount c = m;
+  Eigen::Matrix3d optical;  // of the body frame's axes: x right, y down, z forward
+  optical << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  c.T_imu_camera.R = m.T_imu_camera.R * SO3::nearest(optical);
+  add("camera_frame", "the camera's rotation is that of a body frame (x forward), not of an optical one (z forward)",
+      "camera.T_imu_camera.R", c, {{"camera.T_imu_camera.R", rotation_text(c.T_imu_camera.R)}});
+  c = m;
+  c.T_imu_camera.R = m.T_imu_camera.R * SO3::nearest(optical.transpose());
+  add("camera_frame", "the camera's rotation has the optical rotation twice", "camera.T_imu_camera.R", c,
+      {{"camera.T_imu_camera.R", rotation_text(c.T_imu_camera.R)}});
+  c = m;
+  c.T_imu_camera = m.T_imu_camera.inverse();
+  add("camera_inverted", "the camera's mount is given the wrong way round (camera from IMU)", "camera.T_imu_camera", c,
+      {{"camera.T_imu_camera.p", vector_text(c.T_imu_camera.p)}, {"camera.T_imu_camera.R", rotation_text(c.T_imu_camera.R)}});
+  c = m;
+  std::swap(c.cx, c.cy);
+  add("camera_principal_point", "cx and cy of the camera are exchanged", "camera.cx, camera.cy", c,
+      {{"camera.cx", number_text(c.cx)}, {"camera.cy", number_text(c.cy)}});
+  for (const double factor : {2.0, 0.5}) {
+    c = m;
+    c.fx *= factor;
+    c.fy *= factor;
+    add("camera_focal", fmt::format("the camera's focal length is {} of the right one", factor > 1 ? "half" : "twice"),
+        "camera.fx, camera.fy", c, {{"camera.fx", number_text(c.fx)}, {"camera.fy", number_text(c.fy)}});
+    c = m;
+    c.fx *= factor;
+    add("camera_focal", fmt::format("the camera's fx is {} of the right one", factor > 1 ? "half" : "twice"), "camera.fx", c,
+        {{"camera.fx", number_text(c.fx)}});
+    c = m;
+    c.fy *= factor;
+    add("camera_focal", fmt::format("the camera's fy is {} of the right one", factor > 1 ? "half" : "twice"), "camera.fy", c,
+        {{"camera.fy", number_text(c.fy)}});
+  }
+  for (const Eigen::Matrix3d& p : signed_permutations()) {
+    if (p.determinant() < 0 || p.isApprox(Eigen::Matrix3d::Identity())) continue;
+    c = m;
+    c.T_imu_camera.R = m.T_imu_camera.R * SO3::nearest(p);
+    add("camera_rotation", fmt::format("the camera is turned against its description by {} of the camera", turn_text(SO3::nearest(p))),
+        "camera.T_imu_camera.R", c, {{"camera.T_imu_camera.R", rotation_text(c.T_imu_camera.R)}});
+  }
+  return out;
+}
+
+}  // namespace
+
+void Examination::examine_camera() {
+  const auto& stamps = recorded_.stamps[static_cast<std::size_t>(Sensor::camera)];
+  if (stamps.count < 10) return;
+  CameraMount& m = robot_.camera;
+  if (recorded_.image_width != m.width || recorded_.image_height != m.height) {
+    const std::string is = fmt::format("{} x {}", recorded_.image_width, recorded_.image_height);
+    find({Sensor::camera,
+          "camera_size",
+          fmt::format("the images are {}, described as {} x {}", is, m.width, m.height),
+          "size of the images",
+          "camera.width, camera.height (and the intrinsics that belong to them)",
+          0,
+          "px",
+          {{"camera.width", fmt::format("{}", recorded_.image_width)}, {"camera.height", fmt::format("{}", recorded_.image_height)}},
+          true});
+    m.width = recorded_.image_width;
+    m.height = recorded_.image_height;
+  }
+  const GyroPath path = gyro();
+  const LidarWay way = lidar_way();
+  const CameraTracks tracks(recorded_.tracks, path, way.empty() ? nullptr : &way);
+  if (tracks.pairs() < 20 || tracks.turning() < 0.05) {
+    check(Sensor::camera, "mount, intrinsics, clock", Check::Verdict::unknown,
+          fmt::format("{} pairs of images with corners to follow while the robot turned ({:.2f} rad/s)", tracks.pairs(), tracks.turning()));
+    return;
+  }
+  if (try_camera_hypotheses(tracks)) {
+    const auto& last = diagnosis_.findings.back();
+    if (last.cause != "camera_rotation") return;
+  }
+  examine_camera_fit(tracks);
+}
+
+bool Examination::try_camera_hypotheses(const CameraTracks& tracks) {
+  const double described = tracks.error({robot_.camera, 0});
+  // How well it can be: small turns, focal length and clock are for the fit.
+  std::vector<double> offsets = tracks.likely_offsets(1.3);
+  offsets.insert(offsets.begin(), 0);
+  double best = much_better * described;
+  const CameraHypothesis* which = nullptr;
+  const CameraFit refined = tracks.fit({robot_.camera, 0}, true, true);
+  // What a small correction of the description achieves, a hypothesis must surpass.
+  if (refined.fit.good && degrees(refined.fit.x.head<3>().norm()) < 15) {
+    CameraMount m = robot_.camera;
+    m.T_imu_camera.R = refined.R_IC;
+    m.fx *= refined.focal;
+    m.fy *= refined.focal;
+    best = std::min(best, 0.9 * tracks.error({m, refined.offset}));
+  }
+  double offset = 0;
+  for (const double candidate : offsets) {
+    if (std::abs(candidate) < 0.05) continue;
+    const double error = tracks.error({robot_.camera, candidate});
+    if (error >= best) continue;
+    best = error;
+    offset = candidate;
+  }
+  const std::vector<CameraHypothesis> all = hypotheses(robot_.camera);
+  for (const CameraHypothesis& h : all) {
+    const double error = tracks.error({h.mount, 0});
+    if (error >= best) continue;
+    best = error;
+    which = &h;
+  }
+  const std::string evidence =
+      fmt::format("corners of the images are {:.2f} px from their epipolar lines then, {:.2f} px as described", best, described);
+  if (which != nullptr) {
+    const SO3 before = robot_.camera.T_imu_camera.R;
+    robot_.camera = which->mount;
+    Finding f{Sensor::camera, which->cause, which->text, evidence, which->key, 0, "", which->changes, true};
+    f.turn = (robot_.camera.T_imu_camera.R * before.inverse()).Log();
+    find(std::move(f));
+    return true;
+  }
+  if (offset == 0) return false;
+  const CameraFit fit = tracks.fit({robot_.camera, offset}, false, true);
+  find_offset(Sensor::camera, fit.fit.good ? fit.offset : offset, fit.fit.good ? fit.fit.sigma(4) : 0.005, evidence);
+  return true;
+}
+
+void Examination::examine_camera_fit(const CameraTracks& tracks) {
+  const CameraFit fit = tracks.fit({robot_.camera, 0}, true, true);
+  if (!fit.fit.good) {
+    check(Sensor::camera, "mount, intrinsics, clock", Check::Verdict::unknown, "too few tracks");
+    return;
+  }
+  const Eigen::Vector3d sigma(fit.fit.sigma(0), fit.fit.sigma(1), fit.fit.sigma(2));
+  const double angle = degrees(fit.fit.x.head<3>().norm()), uncertain = degrees(sigma.norm());
+  const std::string evidence = fmt::format("corners of the images are {:.2f} px from their epipolar lines", fit.error);
+  const std::string rotation =
+      fmt::format("{:.2f} degrees from the description, standard deviation {:.2f}; {}", angle, uncertain, evidence);
+  if (fit.error > 3) {
+    check(Sensor::camera, "mount, intrinsics, clock", Check::Verdict::unknown, rotation);
+    return;
+  }
+  const SO3 before = robot_.camera.T_imu_camera.R;
+  if (angle > std::max(rotation_tolerance, sure * uncertain)) {
+    Finding f;
+    f.sensor = Sensor::camera;
+    f.cause = "camera_rotation";
+    f.text = fmt::format("the camera is turned against its description by {} of the camera", turn_text(before.inverse() * fit.R_IC));
+    f.evidence = rotation;
+    f.turn = (fit.R_IC * before.inverse()).Log();
+    std::erase_if(diagnosis_.findings, [](const Finding& x) { return x.cause == "camera_rotation"; });
+    robot_.camera.T_imu_camera.R = fit.R_IC;
+    find_rotation(std::move(f), original_.camera.T_imu_camera.R, fit.R_IC, "camera.T_imu_camera.R");
+  } else {
+    check(Sensor::camera, "rotation of the mount", uncertain > 2 ? Check::Verdict::unknown : Check::Verdict::good, rotation);
+  }
+  const double focal_sigma = fit.fit.sigma(3);
+  const std::string focal = fmt::format("{:.4f} times the described one, standard deviation {:.4f}", fit.focal, focal_sigma);
+  const bool better = fit.error < 0.85 * tracks.fit({robot_.camera, 0}, false, true).error;
+  if (std::abs(fit.fit.x[3]) > std::max(focal_tolerance, sure * focal_sigma) && better) {
+    const double fx = fit.focal * robot_.camera.fx, fy = fit.focal * robot_.camera.fy;
+    find({Sensor::camera,
+          "camera_focal",
+          fmt::format("the camera's focal length is {:.1f} px, described as {:.1f} px", fx, robot_.camera.fx),
+          focal + "; " + evidence,
+          fmt::format("camera.fx: {:.2f}, camera.fy: {:.2f}", fx, fy),
+          fit.focal - 1,
+          "",
+          {{"camera.fx", fmt::format("{:.2f}", fx)}, {"camera.fy", fmt::format("{:.2f}", fy)}},
+          true});
+  } else {
+    check(Sensor::camera, "focal length", focal_sigma > 0.05 ? Check::Verdict::unknown : Check::Verdict::good, focal);
+  }
+  const double offset_sigma = fit.fit.sigma(4);
+  if (std::abs(fit.offset) > std::max(clock_tolerance, sure * offset_sigma)) {
+    find_offset(Sensor::camera, fit.offset, offset_sigma, evidence);
+  } else {
+    check(Sensor::camera, "clock", Check::Verdict::good,
+          fmt::format("{:.2f} ms against the IMU, standard deviation {:.2f} ms", 1e3 * fit.offset, 1e3 * offset_sigma));
+  }
+}
+
+}  // namespace kilvo::lab

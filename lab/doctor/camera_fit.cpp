@@ -1,0 +1,220 @@
+#include "lab/doctor/camera_fit.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "kilvo/vision/camera.hpp"
+#include "lab/doctor/turns.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr std::size_t fewest_tracks = 10;  // of a pair
+constexpr std::size_t most_pairs = 160;
+constexpr double slack = 0.06;         // s, at both ends of the gyro's path
+constexpr double least_way = 0.012;    // m between images, below which the direction is not known
+constexpr double near_epipole = 0.08;  // sine
+
+double clamp_px(double e) { return std::clamp(e, -200.0, 200.0); }
+
+// The direction of the way that fits all tracks of a pair best.
+Eigen::Vector3d direction_of(const std::vector<Eigen::Vector3d>& normals) {
+  Eigen::Vector3d t = Eigen::Vector3d::UnitZ();
+  double scale = 0.01;
+  for (int k = 0; k < 3; ++k) {
+    Eigen::Matrix3d S = Eigen::Matrix3d::Zero();
+    for (const Eigen::Vector3d& n : normals) {
+      const double e = k == 0 ? 0 : t.dot(n);
+      S += n * n.transpose() / (1 + e * e / (scale * scale));
+    }
+    t = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(S).eigenvectors().col(0);
+    scale = 0.003;
+  }
+  return t;
+}
+
+}  // namespace
+
+LidarWay::LidarWay(const std::vector<SweepPose>& poses, const SE3& T_IL, double offset, const std::vector<InertialSample>& imu,
+                   const GyroPath& gyro, const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
+  constexpr double weak = 0.02;  // share of the sweep's information: below it the LiDAR does not know its way
+  std::vector<Pose> sweeps;
+  for (const SweepPose& p : poses) {
+    if (!p.good || p.weakest < weak) continue;
+    Pose pose{p.t + offset, p.T_WL * T_IL.inverse()};
+    // A sweep gives the mean of the way during it, which is off its middle by a T^2 / 24.
+    const double a = p.begin + offset, b = p.end + offset;
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();
+    double n = 0;
+    for (auto it = std::ranges::lower_bound(imu, a, {}, &InertialSample::t); it != imu.end() && it->t < b; ++it) {
+      force += pose.T_WI.R * SO3::from_quaternion(gyro.between(pose.t, it->t)) * Eigen::Vector3d(it->accel - ba);
+      n += 1;
+    }
+    if (n > 0) pose.T_WI.p -= (b - a) * (b - a) / 24 * (force / n + g_W);
+    sweeps.push_back(pose);
+  }
+  for (std::size_t i = 1; i < sweeps.size(); ++i) {
+    if (sweeps[i].t - sweeps[i - 1].t < 0.35) bridge(sweeps[i - 1], sweeps[i], imu, gyro, g_W, ba);
+  }
+}
+
+// Double integration from one sweep to the next; the velocity at its beginning is the one with which it ends where the next sweep says.
+void LidarWay::bridge(const Pose& a, const Pose& b, const std::vector<InertialSample>& imu, const GyroPath& gyro,
+                      const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
+  if (!gyro.covers(a.t, b.t)) return;
+  std::vector<Pose> steps{a};
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();
+  auto it = std::ranges::lower_bound(imu, a.t, {}, &InertialSample::t);
+  for (double t = a.t; t < b.t && it != imu.end(); ++it) {
+    const double next = std::min(it->t, b.t), dt = next - t;
+    if (!(dt > 0)) continue;
+    const SO3 R = a.T_WI.R * SO3::from_quaternion(gyro.between(a.t, 0.5 * (t + next)));
+    const Eigen::Vector3d force = R * Eigen::Vector3d(it->accel - ba) + g_W;
+    Pose pose{next, {a.T_WI.R * SO3::from_quaternion(gyro.between(a.t, next)), steps.back().T_WI.p + dt * v + 0.5 * dt * dt * force}};
+    v += dt * force;
+    steps.push_back(pose);
+    t = next;
+  }
+  const double span = steps.back().t - a.t;
+  if (!(span > 0) || b.t - steps.back().t > 0.05) return;
+  const Eigen::Vector3d missing = (b.T_WI.p - steps.back().T_WI.p) / span;
+  for (Pose& pose : steps) {
+    pose.T_WI.p += (pose.t - a.t) * missing;
+    if (poses_.empty() || pose.t > poses_.back().t) poses_.push_back(pose);
+  }
+}
+
+std::optional<SE3> LidarWay::at(double t, const GyroPath& gyro) const {
+  const auto after = std::ranges::upper_bound(poses_, t, {}, &Pose::t);
+  if (after == poses_.begin() || after == poses_.end()) return std::nullopt;
+  const Pose &a = *std::prev(after), &b = *after;
+  if (b.t - a.t > 0.06) return std::nullopt;
+  const double s = (t - a.t) / (b.t - a.t);
+  return SE3{a.T_WI.R * SO3::from_quaternion(gyro.between(a.t, t)), (1 - s) * a.T_WI.p + s * b.T_WI.p};
+}
+
+CameraTracks::CameraTracks(const std::vector<TrackedPair>& tracks, const GyroPath& gyro, const LidarWay* way) : gyro_(gyro), way_(way) {
+  std::vector<const TrackedPair*> all;
+  for (const TrackedPair& pair : tracks) {
+    if (pair.tracks.size() >= fewest_tracks && pair.to - pair.from < 0.4 && gyro.covers(pair.from - slack, pair.to + slack))
+      all.push_back(&pair);
+  }
+  // The pairs that turned most say most; of those an even choice in time.
+  std::vector<double> turns;
+  for (const TrackedPair* p : all) turns.push_back(gyro.rate(p->from, p->to).norm());
+  std::vector<double> sorted = turns;
+  std::ranges::sort(sorted);
+  const double least = sorted.size() > most_pairs ? sorted[sorted.size() - most_pairs] : 0;
+  double sum = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (turns[i] < least || pairs_.size() >= most_pairs) continue;
+    pairs_.push_back(all[i]);
+    sum += turns[i] * turns[i];
+  }
+  if (!pairs_.empty()) turning_ = std::sqrt(sum / static_cast<double>(pairs_.size()));
+}
+
+std::vector<std::vector<Eigen::Vector4d>> CameraTracks::rays_of(const CameraMount& mount) const {
+  std::vector<std::vector<Eigen::Vector4d>> out;
+  const Camera camera(mount);
+  for (const TrackedPair* pair : pairs_) {
+    std::vector<Eigen::Vector4d> rays;
+    for (const Track& track : pair->tracks) {
+      const auto a = camera.unproject(track.from.cast<double>()), b = camera.unproject(track.to.cast<double>());
+      // The same number of tracks under every guess: what has no ray looks along the axis, and fits nothing.
+      rays.push_back(a && b ? Eigen::Vector4d(a->x(), a->y(), b->x(), b->y()) : Eigen::Vector4d(0, 0, 1, 1));
+    }
+    out.push_back(std::move(rays));
+  }
+  return out;
+}
+
+void CameraTracks::residuals(const CameraGuess& guess, const std::vector<std::vector<Eigen::Vector4d>>& rays, const SO3& R_IC, double focal,
+                             double offset, std::size_t stride, Residuals& out) const {
+  out.width = 1;
+  const double px = 0.5 * (guess.mount.fx + guess.mount.fy) * focal;
+  std::vector<Eigen::Vector3d> normals, first;
+  for (std::size_t i = 0; i < pairs_.size(); i += stride) {
+    const double a = pairs_[i]->from + offset, b = pairs_[i]->to + offset;
+    const SO3 R_12 = R_IC.inverse() * SO3::from_quaternion(gyro_.between(a, b)) * R_IC;
+    normals.clear(), first.clear();
+    for (const Eigen::Vector4d& ray : rays[i]) {
+      const Eigen::Vector3d u = Eigen::Vector3d(ray[0] / focal, ray[1] / focal, 1).normalized();
+      const Eigen::Vector3d w = R_12 * Eigen::Vector3d(ray[2] / focal, ray[3] / focal, 1).normalized();
+      first.push_back(u);
+      normals.push_back(u.cross(w));
+    }
+    Eigen::Vector3d t = Eigen::Vector3d::Zero();
+    if (way_ != nullptr && !way_->empty()) {
+      const auto A = way_->at(a, gyro_), B = way_->at(b, gyro_);
+      if (A && B) {
+        const SE3 T_IC{R_IC, guess.mount.T_imu_camera.p};
+        t = ((*A * T_IC).inverse() * (*B * T_IC)).p;
+      }
+    }
+    const bool known = t.norm() > least_way;
+    t = known ? Eigen::Vector3d(t.normalized()) : direction_of(normals);
+    for (std::size_t k = 0; k < normals.size(); ++k) {
+      const double sine = std::max(t.cross(first[k]).norm(), near_epipole);
+      out.r.push_back(clamp_px(px * t.dot(normals[k]) / sine));
+      out.block.push_back(static_cast<int>(pairs_[i]->from / block_seconds));
+    }
+  }
+}
+
+double CameraTracks::error(const CameraGuess& guess) const {
+  try {
+    Residuals r;
+    residuals(guess, rays_of(guess.mount), guess.mount.T_imu_camera.R, 1, guess.offset, std::max<std::size_t>(1, pairs_.size() / 60), r);
+    if (r.groups() < 300) return INFINITY;
+    // In units of a pixel of the image, not of the guess: a shorter focal length must not look better.
+    double sum = 0;
+    for (const double e : r.r) sum += std::log1p(e * e);
+    return std::sqrt(std::expm1(sum / static_cast<double>(r.groups())));
+  } catch (const std::invalid_argument&) {
+    return INFINITY;
+  }
+}
+
+CameraFit CameraTracks::fit(const CameraGuess& guess, bool with_focal, bool with_offset) const {
+  CameraFit out;
+  out.R_IC = guess.mount.T_imu_camera.R;
+  out.offset = guess.offset;
+  std::vector<std::vector<Eigen::Vector4d>> rays;
+  try {
+    rays = rays_of(guess.mount);
+  } catch (const std::invalid_argument&) {
+    return out;
+  }
+  const auto rows = [&](const Eigen::VectorXd& x, Residuals& r) {
+    residuals(guess, rays, guess.mount.T_imu_camera.R * SO3::Exp(x.head<3>()), std::exp(std::clamp(x[3], -2.0, 2.0)),
+              guess.offset + std::clamp(x[4], -slack, slack), 1, r);
+  };
+  Eigen::VectorXd start = Eigen::VectorXd::Zero(5), prior(5), step(5);
+  prior << INFINITY, INFINITY, INFINITY, with_focal ? 1.0 : 1e-6, with_offset ? 1.0 : 1e-7;
+  step << 1e-3, 1e-3, 1e-3, 1e-3, 5e-4;
+  out.fit = robust_fit(rows, start, prior, step, 8);
+  if (!out.fit.good) return out;
+  out.R_IC = guess.mount.T_imu_camera.R * SO3::Exp(out.fit.x.head<3>());
+  out.focal = std::exp(out.fit.x[3]);
+  out.offset = guess.offset + out.fit.x[4];
+  out.error = out.fit.scale;
+  return out;
+}
+
+std::vector<double> CameraTracks::likely_offsets(double reach) const {
+  // Mean motion of the tracks, whatever the calibration: its length against the gyro's.
+  std::vector<Turn> turns;
+  for (const TrackedPair* pair : pairs_) {
+    std::vector<float> lengths;
+    for (const Track& t : pair->tracks) lengths.push_back((t.to - t.from).norm());
+    const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+    std::ranges::nth_element(lengths, middle);
+    turns.push_back({pair->from, pair->to, {Eigen::Vector3d(static_cast<double>(*middle), 0, 0), Eigen::Vector3d::Zero()}, 1});
+  }
+  return kilvo::lab::likely_offsets(turns, gyro_, reach);
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,111 @@
+// One recording under judgement. Each step judges one sense with what the steps before have settled, and mends the description in memory
+// when it is wrong, so that a fault of one sense does not look like a fault of the next.
+#pragma once
+
+#include <optional>
+
+#include "kilvo/sensors/robot.hpp"
+#include "lab/doctor/camera_fit.hpp"
+#include "lab/doctor/finding.hpp"
+#include "lab/doctor/leg_path.hpp"
+#include "lab/doctor/recorded.hpp"
+#include "lab/doctor/scan_odometry.hpp"
+#include "lab/doctor/translation_fit.hpp"
+#include "lab/doctor/turns.hpp"
+
+namespace kilvo::lab {
+
+/// How one sense's turning agrees with the gyro's.
+struct SenseAgreement {
+  bool present = false;
+  bool known = false;                                   // it turned enough, and the gyro explains it under some mount and offset
+  bool agrees = false;                                  // under the mount and the clock of the configuration
+  Eigen::Matrix3d error = Eigen::Matrix3d::Identity();  // in the IMU frame: measured mount = error * configured mount
+  double scale = 1;                                     // of the gyro
+  double offset = 0;                                    // s
+  double explained = 0;                                 // under the best mount
+  double as_described = 0;                              // under the configured one
+  double turning = 0;  // rad/s, rms
+  double weakest = 0;                                   // rad/s, rms of the turning about the least turned axis
+};
+
+class Examination {
+ public:
+  Examination(const Recorded& recorded, const Robot& robot) : recorded_(recorded), robot_(robot), original_(robot) {}
+
+  /// All checks, in their order.
+  Diagnosis run();
+
+  /// After run(): the description as the data have it, for refinement.
+  const Robot& robot() const { return robot_; }
+
+ private:
+  // imu_examination.cpp
+  void examine_rates();
+  void examine_acceleration_unit();
+  void agree_with_gyro();
+  void settle_axes();
+  void accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence);
+  void examine_upright();
+  void blame_imu_for_all();
+  // lidar_examination.cpp
+  void examine_lidar();
+  void examine_point_times();
+  void examine_lidar_rotation();
+  void examine_lidar_clock();
+  void examine_lidar_position();
+  // leg_examination.cpp
+  void examine_legs();
+  bool examine_leg_names();
+  struct LegScore {
+    double explained = 0, flatness = 0;  // share; degrees
+    double offset = 0;
+    Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+    double cost() const;
+  };
+  LegScore score_legs(const LegHypothesis* hypothesis, double offset, bool any_mount) const;
+  std::vector<LegPose> legs_under(const LegHypothesis* hypothesis) const;
+  bool try_leg_hypotheses();
+  void examine_leg_rotation();
+  void settle_imu_link(const SO3& measured);
+  void examine_leg_lengths();
+  void accuse_leg_lengths(double scale, double height);
+  void accuse_imu_place(double height);
+  std::string link_at_height(double height) const;
+  // camera_examination.cpp
+  void examine_camera();
+  bool try_camera_hypotheses(const CameraTracks& tracks);
+  void examine_camera_fit(const CameraTracks& tracks);
+
+  GyroPath gyro() const { return {recorded_.imu, gyro_axes_, Eigen::Vector3d::Zero()}; }
+  SenseAgreement agreement(const std::vector<Turn>& turns, const SO3& mount, double least_explained) const;
+  std::vector<InertialSample> mended_imu() const;
+  /// Without places where the LiDAR's way is not known.
+  LidarWay lidar_way() const;
+  SE3 T_link_imu() const { return robot_.imu.T_link_imu; }
+  void check(Sensor sensor, const std::string& what, Check::Verdict verdict, const std::string& detail);
+  void find(Finding finding);
+  void find_offset(Sensor sensor, double offset, double sigma, const std::string& evidence);
+  void find_rotation(Finding finding, const SO3& before, const SO3& after, const std::string& key);
+
+  const Recorded& recorded_;
+  Robot robot_, original_;
+  Eigen::Matrix3d gyro_axes_ = Eigen::Matrix3d::Identity();  // take what was written to rad/s and m/s^2 in the IMU frame
+  Eigen::Matrix3d accel_axes_ = Eigen::Matrix3d::Identity();
+  std::vector<SweepPose> rigid_, way_;  // the LiDAR's way without and with the gyro's help
+  std::vector<Turn> lidar_turns_, leg_turns_;
+  SenseAgreement lidar_, legs_;
+  std::optional<LegHypothesis> leg_mend_;
+  double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock
+  std::optional<TranslationFit> translation_;
+  Diagnosis diagnosis_;
+};
+
+std::string rotation_text(const SO3& R);  // as YAML, row by row
+std::string vector_text(const Eigen::Vector3d& p);
+std::string number_text(double x);
+/// "5.0 degrees about y": the axis is named when the rotation is about one.
+std::string turn_text(const SO3& turn);
+inline double degrees(double radians) { return radians * 57.29577951308232; }
+
+}  // namespace kilvo::lab

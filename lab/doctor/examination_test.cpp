@@ -1,0 +1,117 @@
+// Wrong descriptions of a simulated robot: the culprit is named, and nobody else is.
+#include "lab/doctor/examination.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "lab/settings/settings.hpp"
+#include "lab/simulation/description.hpp"
+#include "lab/simulation/simulator.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+/// 16 s in a room: 3.4 s of standing, then a walk with a turn.
+struct Walked {
+  Recorded recorded;
+  Robot robot;
+};
+
+const Walked& walked() {
+  static const Walked walk = [] {
+    SimulatorConfig config;
+    config.duration = 16;
+    config.use = {true, true, true, false};
+    config.lidar.points = 8000;
+    for (const Scenario& scenario : scenarios()) {
+      if (scenario.name != "room") continue;
+      Simulator simulator(scenario, config);
+      Recorder recorder;
+      while (const auto measurement = simulator.next()) recorder.push(*measurement);
+      Walked out{recorder.finish(), {}};
+      out.robot = parse_settings(simulated_config(config, ""), "simulated", ".").robot;
+      out.robot.urdf = urdf_of(config.shape);
+      return out;
+    }
+    return Walked{};
+  }();
+  return walk;
+}
+
+std::vector<std::string> causes(const Recorded& recorded, const Robot& robot) {
+  std::vector<std::string> out;
+  for (const Finding& finding : Examination(recorded, robot).run().findings) out.push_back(finding.cause);
+  return out;
+}
+
+SO3 turned(const Eigen::Vector3d& by_degrees) { return SO3::Exp(by_degrees / 57.29577951308232); }
+
+TEST(Doctor, ARightDescriptionIsNotAccused) {
+  const Diagnosis diagnosis = Examination(walked().recorded, walked().robot).run();
+  EXPECT_TRUE(diagnosis.good()) << diagnosis.findings.front().text;
+  EXPECT_FALSE(diagnosis.unknown());
+}
+
+TEST(Doctor, ALidarThatIsTurnedIsNamedWithItsMount) {
+  for (const Eigen::Vector3d& turn : {Eigen::Vector3d(180, 0, 0), Eigen::Vector3d(0, 0, 90), Eigen::Vector3d(0, 3, 0)}) {
+    Robot robot = walked().robot;
+    const SO3 right = robot.lidar.T_imu_lidar.R;
+    robot.lidar.T_imu_lidar.R = right * turned(turn);
+    Examination examination(walked().recorded, robot);
+    const Diagnosis diagnosis = examination.run();
+    ASSERT_EQ(diagnosis.findings.size(), 1U) << turn.transpose();
+    EXPECT_EQ(diagnosis.findings.front().cause, "lidar_rotation");
+    EXPECT_LT(degrees((right.inverse() * examination.robot().lidar.T_imu_lidar.R).Log().norm()), 0.6) << turn.transpose();
+  }
+}
+
+TEST(Doctor, ClocksAreNamed) {
+  for (const double offset : {0.01, -0.1, 0.7}) {
+    Recorded recorded = walked().recorded;
+    for (Sweep& s : recorded.sweeps) s.t += offset, s.begin += offset, s.end += offset;
+    EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("lidar_clock")) << offset;
+  }
+  Recorded recorded = walked().recorded;
+  for (LegSample& s : recorded.legs) s.t += 0.05;
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("legs_clock"));
+}
+
+TEST(Doctor, TheImuIsNamedWhenAllOthersDisagreeWithIt) {
+  const Eigen::Matrix3d quarter = turned({0, 0, 90}).matrix();
+  Recorded recorded = walked().recorded;
+  for (InertialSample& s : recorded.imu) s.gyro = quarter * s.gyro, s.accel = quarter * s.accel;
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("imu_rotated"));
+  recorded = walked().recorded;
+  for (InertialSample& s : recorded.imu) s.gyro.y() *= -1, s.accel.y() *= -1;
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("imu_axes"));
+  recorded = walked().recorded;
+  for (InertialSample& s : recorded.imu) s.gyro *= 57.29577951308232;
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("gyro_unit"));
+}
+
+TEST(Doctor, LegsAreNamedWithTheJoint) {
+  Recorded recorded = walked().recorded;
+  const auto knee = static_cast<std::size_t>(std::ranges::find(recorded.joint_names, "left_knee_joint") - recorded.joint_names.begin());
+  ASSERT_LT(knee, recorded.joint_names.size());
+  for (LegSample& s : recorded.legs) s.position[knee] *= -1;
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("joint_sign"));
+  Robot robot = walked().robot;
+  std::swap(robot.feet[0].link, robot.feet[1].link);
+  EXPECT_THAT(causes(walked().recorded, robot), ElementsAre("feet_swapped"));
+}
+
+TEST(Doctor, WhoStandsStillIsNotJudged) {
+  Recorded recorded = walked().recorded;
+  std::erase_if(recorded.imu, [](const InertialSample& s) { return s.t > 3; });
+  std::erase_if(recorded.legs, [](const LegSample& s) { return s.t > 3; });
+  std::erase_if(recorded.sweeps, [](const Sweep& s) { return s.t > 3; });
+  Robot robot = walked().robot;
+  robot.lidar.T_imu_lidar.R = robot.lidar.T_imu_lidar.R * turned({0, 0, 90});
+  EXPECT_THAT(causes(recorded, robot), IsEmpty());
+}
+
+}  // namespace
+}  // namespace kilvo::lab

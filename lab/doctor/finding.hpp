@@ -1,0 +1,46 @@
+// What the checks found wrong: who, what, by how much, on what evidence, and which setting mends it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kilvo/sensors/measurement.hpp"
+
+namespace kilvo::lab {
+
+/// A setting and the value that it should have, as YAML.
+struct Change {
+  std::string key, value;
+};
+
+struct Finding {
+  Sensor sensor = Sensor::imu;  // the culprit
+  std::string cause;            // one word of a fixed list, as "lidar_rotation" (docs/calibration.md)
+  std::string text;             // what is wrong, with its size
+  std::string evidence;         // what shows it
+  std::string remedy;           // what mends it, for a person
+  double size = 0;              // in `unit`
+  std::string unit;
+  std::vector<Change> changes;                     // that mend it in the configuration; empty when it has to be mended elsewhere
+  bool fatal = true;                               // a run would be wrong; false: the estimator copes with it
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();  // rad, IMU frame: a mount that is wrong by a rotation
+};
+
+/// Something that was looked at.
+struct Check {
+  enum class Verdict { good, note, wrong, unknown };
+  Sensor sensor = Sensor::imu;
+  std::string what;  // "rotation of the LiDAR's mount"
+  Verdict verdict = Verdict::unknown;
+  std::string detail;  // measured value with its standard deviation, or why it cannot be judged
+};
+
+struct Diagnosis {
+  std::vector<Finding> findings;
+  std::vector<Check> checks;
+  bool good() const { return findings.empty(); }
+  /// Nothing could be judged at all.
+  bool unknown() const;
+};
+
+}  // namespace kilvo::lab

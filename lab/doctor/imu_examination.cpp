@@ -1,0 +1,266 @@
+// The IMU: its units, its axes, and whether it is what all others disagree with.
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+
+#include "lab/doctor/examination.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double gravity = 9.80665;  // m/s^2
+constexpr double per_degree = 57.29577951308232;
+constexpr double rate_tolerance = 0.2;  // of the nominal rate
+
+double median_norm(const std::vector<InertialSample>& imu) {
+  std::vector<double> norms;
+  for (const InertialSample& s : imu) norms.push_back(s.accel.norm());
+  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
+  std::ranges::nth_element(norms, middle);
+  return *middle;
+}
+
+bool is_identity(const Eigen::Matrix3d& m) { return m.isApprox(Eigen::Matrix3d::Identity(), 1e-9); }
+
+}  // namespace
+
+void Examination::examine_rates() {
+  const double nominal[] = {robot_.imu.rate, robot_.legs.rate, robot_.lidar.rate, robot_.camera.rate};
+  for (std::size_t i = 0; i < sensor_count; ++i) {
+    const StampStatistics& s = recorded_.stamps[i];
+    const auto sensor = static_cast<Sensor>(i);
+    if (s.count < 20 || !(s.period > 0) || !(nominal[i] > 0)) continue;
+    const double rate = 1 / s.period;
+    const std::string measured = fmt::format("{:.1f} Hz, described as {:.1f} Hz", rate, nominal[i]);
+    if (std::abs(rate / nominal[i] - 1) < rate_tolerance) {
+      check(sensor, "rate", Check::Verdict::good, measured);
+      continue;
+    }
+    const std::string key = std::string(name_of(sensor)) + ".rate", value = fmt::format("{:.0f}", rate);
+    find({sensor,
+          std::string(name_of(sensor)) + "_rate",
+          fmt::format("the {} comes at {}", name_of(sensor), measured),
+          fmt::format("median of {} steps between stamps", s.count - 1),
+          key + ": " + value,
+          rate,
+          "Hz",
+          {{key, value}},
+          false});
+  }
+}
+
+void Examination::examine_acceleration_unit() {
+  const double norm = median_norm(recorded_.imu);
+  const std::string evidence = fmt::format("median norm of the acceleration: {:.3f}", norm);
+  if (norm > 6.5 && norm < 14) {
+    check(Sensor::imu, "unit of the acceleration", Check::Verdict::good, evidence + " m/s^2");
+    return;
+  }
+  if (norm > 0.7 && norm < 1.4) {
+    accel_axes_ *= gravity;
+    find({Sensor::imu,
+          "accel_unit",
+          "the acceleration is in g, not in m/s^2",
+          evidence,
+          "the driver should publish m/s^2; the estimator converts g by itself",
+          norm,
+          "",
+          {},
+          false});
+    return;
+  }
+  if (!(norm > 0)) return;
+  const double thousandths = norm / 1000;
+  const bool milli_g = thousandths > 0.7 && thousandths < 1.4;
+  accel_axes_ *= gravity / norm;
+  find({Sensor::imu,
+        "accel_unit",
+        milli_g ? "the acceleration is in thousandths of g (or in cm/s^2), not in m/s^2"
+                : fmt::format("the acceleration has a wrong unit or scale: gravity measures {:.4g}", norm),
+        evidence,
+        "the driver must publish m/s^2",
+        norm,
+        "",
+        {},
+        true});
+}
+
+void Examination::agree_with_gyro() {
+  for (std::size_t i = 1; i < rigid_.size(); ++i) {
+    const SweepPose &a = rigid_[i - 1], &b = rigid_[i];
+    if (a.good && b.good && b.t - a.t < 0.6 && b.t > a.t)
+      lidar_turns_.push_back({a.t, b.t, {(a.T_WL.R.inverse() * b.T_WL.R).Log(), Eigen::Vector3d::Zero()}, 1});
+  }
+  lidar_ = agreement(lidar_turns_, robot_.lidar.T_imu_lidar.R, 0.8);
+  if (lidar_.known && (lidar_.scale > 1.15 || lidar_.scale < 0.87)) {
+    const bool deg = std::abs(lidar_.scale / per_degree - 1) < 0.15;
+    const double factor = deg ? per_degree : lidar_.scale;
+    gyro_axes_ /= factor;
+    find({Sensor::imu,
+          "gyro_unit",
+          deg ? std::string("the gyro is in degrees per second, not in rad/s")
+              : fmt::format("the gyro measures {:.3g} times the turning", lidar_.scale),
+          fmt::format("turning by the gyro against that of the LiDAR's sweeps: {:.2f}", lidar_.scale),
+          "the driver must publish rad/s",
+          lidar_.scale,
+          "",
+          {},
+          true});
+    lidar_ = agreement(lidar_turns_, robot_.lidar.T_imu_lidar.R, 0.8);
+  }
+  if (recorded_.legs.empty() || robot_.legs.type != "joints") return;
+  leg_turns_ = leg_turns(legs_under(nullptr), 0.04);
+  legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), 0.5);
+  if (lidar_.known || leg_turns_.empty()) return;
+  // Without a LiDAR the legs judge the gyro's unit.
+  const Eigen::Matrix3d before = gyro_axes_;
+  gyro_axes_ = before / per_degree;
+  const SenseAgreement in_degrees = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), 0.5);
+  if (in_degrees.known && 1 - in_degrees.explained < 0.5 * (1 - legs_.explained)) {
+    legs_ = in_degrees;
+    find({Sensor::imu,
+          "gyro_unit",
+          "the gyro is in degrees per second, not in rad/s",
+          fmt::format("the legs explain {:.0f} % of its turning then", 100 * in_degrees.explained),
+          "the driver must publish rad/s",
+          per_degree,
+          "",
+          {},
+          true});
+  } else {
+    gyro_axes_ = before;
+  }
+}
+
+void Examination::accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence) {
+  Finding f;
+  f.sensor = Sensor::imu;
+  f.evidence = evidence;
+  const bool same = gyro.isApprox(accel, 1e-9);
+  f.cause = same && gyro.determinant() > 0 ? "imu_rotated" : "imu_axes";
+  if (same && gyro.determinant() > 0) {
+    f.text = fmt::format("the IMU's axes are turned against the description by {}", turn_text(SO3::nearest(gyro)));
+  } else if (same) {
+    f.text = "the IMU's axes are left-handed";
+  } else if (is_identity(accel)) {
+    f.text = gyro.determinant() < 0 ? "the gyro's axes have a wrong sign (left-handed)" : "the gyro's axes do not fit the accelerometer's";
+  } else if (is_identity(gyro)) {
+    f.text = accel.determinant() < 0 ? "the accelerometer's axes have a wrong sign (left-handed)"
+                                     : "the accelerometer's axes do not fit the gyro's";
+  } else {
+    f.text = "the axes of gyro and accelerometer differ from the description and from each other";
+  }
+  f.text += fmt::format(": gyro {}, accelerometer {} would be right", axes_text(gyro), axes_text(accel));
+  f.remedy = "the driver must publish both in one right-handed frame; for one that is only turned, the mounts can be turned instead";
+  find(std::move(f));
+  gyro_axes_ = gyro * gyro_axes_;
+  accel_axes_ = accel * accel_axes_;
+}
+
+void Examination::settle_axes() {
+  if (!lidar_.known) {
+    if (!legs_.known) return;
+    const Eigen::Matrix3d G = nearest_permutation(legs_.error).transpose();
+    if (G.determinant() < 0)
+      accuse_imu_axes(G, Eigen::Matrix3d::Identity(), "the legs turn as the gyro does only with axes of the other hand");
+    return;
+  }
+  const Eigen::Matrix3d G =
+      nearest_permutation(lidar_.error).transpose();  // gyro -> the axes of the description, if the LiDAR's mount is right
+  const Eigen::Matrix3d before = gyro_axes_;
+  gyro_axes_ = G * before;
+  const SO3 R_IL = SO3::nearest(G * lidar_.error * robot_.lidar.T_imu_lidar.R.matrix());
+  const TranslationRows rows(rigid_, recorded_.imu, gyro(), R_IL, lidar_.offset);
+  gyro_axes_ = before;
+  Eigen::Matrix3d A = G;
+  double rms = 0;
+  if (const auto as_gyro = rows.fit(G * accel_axes_)) {
+    rms = as_gyro->rms;
+    double best = 0.6 * as_gyro->rms;
+    for (const Eigen::Matrix3d& axes : signed_permutations()) {
+      const auto other = rows.fit(axes * accel_axes_);
+      if (!other || other->rms >= best) continue;
+      best = rms = other->rms;
+      A = axes;
+    }
+  }
+  const std::string evidence =
+      fmt::format("turning and acceleration of the LiDAR's sweeps against the IMU's ({:.0f} % explained, {:.2f} m/s left)",
+                  100 * lidar_.explained, rms);
+  if (is_identity(G) && is_identity(A)) {
+    check(Sensor::imu, "axes", Check::Verdict::good, evidence);
+    return;
+  }
+  const bool proper = G.determinant() > 0 && A.isApprox(G, 1e-9);
+  const bool legs_disagree_too = legs_.known && nearest_permutation(legs_.error).transpose().isApprox(G, 1e-9);
+  if (proper && !legs_disagree_too) return;  // the LiDAR's mount: examined next
+  accuse_imu_axes(G, A, evidence);
+  lidar_ = agreement(lidar_turns_, robot_.lidar.T_imu_lidar.R, 0.8);
+  if (!leg_turns_.empty()) legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), 0.5);
+}
+
+// Without a LiDAR the accelerometer has only the robot's uprightness to be held against.
+void Examination::examine_upright() {
+  if (recorded_.legs.empty() || robot_.legs.type != "joints" || lidar_.known) return;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  for (const InertialSample& s : recorded_.imu) force += accel_axes_ * s.accel / static_cast<double>(recorded_.imu.size());
+  // Impacts that are sampled without a filter do not average to gravity.
+  if (std::abs(force.norm() / gravity - 1) > 0.1) return;
+  const Eigen::Vector3d up_link = robot_.imu.T_link_imu.R * force.normalized();
+  // Up by the legs: from the feet to the hips.
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  for (const LegPose& pose : legs_under(leg_mend_ ? &*leg_mend_ : nullptr)) {
+    for (const FootPose& foot : pose.foot) up -= foot.p[0];
+  }
+  if (!(up.norm() > 0)) return;
+  const double angle = degrees(std::acos(std::clamp(up_link.dot(up.normalized()), -1.0, 1.0)));
+  const std::string detail = fmt::format("gravity by the accelerometer is {:.0f} degrees from where the feet are", angle);
+  constexpr double most = 50;  // degrees
+  if (angle < most) {
+    check(Sensor::imu, "uprightness", Check::Verdict::good, detail);
+    return;
+  }
+  const bool turned =
+      std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "imu_mount_rotation" || f.cause == "imu_axes"; });
+  if (turned) return;
+  find({Sensor::imu,
+        legs_.known && legs_.agrees ? "imu_axes" : "imu_mount_rotation",
+        legs_.known && legs_.agrees ? "the accelerometer's axes are not those of the gyro" : "the IMU is not mounted as described",
+        detail,
+        "imu.T_link_imu.R, or the axes in the driver",
+        angle,
+        "deg",
+        {},
+        true});
+}
+
+// Where every other sense is turned, or early, by the same, it is the IMU that is.
+void Examination::blame_imu_for_all() {
+  std::vector<Finding>& all = diagnosis_.findings;
+  const auto of = [&all](const std::string& cause) { return std::ranges::find(all, cause, &Finding::cause); };
+  const auto lidar = of("lidar_rotation"), mount = of("imu_mount_rotation"), camera = of("camera_rotation");
+  constexpr double alike = 0.04;  // rad
+  if (lidar != all.end() && mount != all.end() && (lidar->turn - mount->turn).norm() < std::max(alike, 0.2 * lidar->turn.norm())) {
+    Finding f = *mount;
+    f.cause = "imu_rotated";
+    f.text = fmt::format("the IMU's axes are turned against the description by {}", turn_text(SO3::Exp(mount->turn)));
+    f.evidence = "LiDAR and legs agree with each other and disagree with the IMU by the same rotation";
+    f.changes.insert(f.changes.end(), lidar->changes.begin(), lidar->changes.end());
+    if (camera != all.end()) f.changes.insert(f.changes.end(), camera->changes.begin(), camera->changes.end());
+    std::erase_if(all, [](const Finding& x) {
+      return x.cause == "lidar_rotation" || x.cause == "imu_mount_rotation" || x.cause == "camera_rotation";
+    });
+    all.push_back(f);
+  }
+  const auto lidar_clock = of("lidar_clock"), leg_clock = of("legs_clock"), camera_clock = of("camera_clock");
+  if (lidar_clock == all.end() || (leg_clock == all.end() && camera_clock == all.end())) return;
+  const Finding& other = leg_clock != all.end() ? *leg_clock : *camera_clock;
+  constexpr double same_time = 0.009;  // s
+  if (std::abs(lidar_clock->size - other.size) > same_time) return;
+  const double offset = -lidar_clock->size;
+  std::erase_if(all, [](const Finding& x) { return x.cause == "lidar_clock" || x.cause == "legs_clock" || x.cause == "camera_clock"; });
+  robot_.imu.time_offset = original_.imu.time_offset;
+  find_offset(Sensor::imu, offset, 0.001, "the other sensors agree with each other and are off against the IMU by the same time");
+}
+
+}  // namespace kilvo::lab

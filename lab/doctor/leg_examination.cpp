@@ -1,0 +1,301 @@
+// The legs: units and names of their joints, the URDF, and the IMU's mount on the link that they carry.
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+#include <set>
+
+#include "lab/doctor/examination.hpp"
+#include "lab/doctor/leg_hypotheses.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double interval = 0.04;  // s, of a turn
+constexpr double period = 0.009;   // s between poses
+constexpr double least_explained = 0.5;
+constexpr double much_better = 0.6;         // of the cost that a hypothesis may leave
+constexpr double rotation_tolerance = 2.5;  // degrees
+constexpr double clock_tolerance = 0.009;   // s: soles that roll shift it by 6 ms
+constexpr double sure = 4;                  // standard deviations
+
+// Normal of a sole, towards the link that stands on it.
+Eigen::Vector3d normal_of(const FootPose& foot) {
+  if (foot.corners < 3) return Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (int i = 0; i < foot.corners; ++i) mean += foot.p[static_cast<std::size_t>(i)] / foot.corners;
+  Eigen::Matrix3d S = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < foot.corners; ++i) {
+    const Eigen::Vector3d d = foot.p[static_cast<std::size_t>(i)] - mean;
+    S += d * d.transpose();
+  }
+  const Eigen::Vector3d n = Eigen::JacobiSVD<Eigen::Matrix3d>(S, Eigen::ComputeFullU).matrixU().col(2);
+  return n.dot(mean) > 0 ? Eigen::Vector3d(-n) : n;
+}
+
+double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return degrees(std::acos(std::clamp(a.normalized().dot(b.normalized()), -1.0, 1.0)));
+}
+
+bool mentions(const std::string& text, const std::string& word) {
+  std::string lower;
+  for (const char c : text) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return lower.find(word) != std::string::npos || (lower.size() > 2 && lower[0] == word[0] && lower[1] == '_');
+}
+
+}  // namespace
+
+double Examination::LegScore::cost() const { return 1 - std::max(explained, -1.0) + 0.5 * std::min(flatness, 20.0) / 20; }
+
+std::vector<LegPose> Examination::legs_under(const LegHypothesis* hypothesis) const {
+  LegHypothesis both;
+  if (hypothesis != nullptr) both = *hypothesis;
+  if (leg_mend_ && hypothesis != &*leg_mend_) both = joined(*leg_mend_, both);
+  return leg_path(recorded_, robot_, &both, period, nullptr);
+}
+
+// How far the soles are from flat on the ground while the robot stands still.
+Examination::LegScore Examination::score_legs(const LegHypothesis* hypothesis, double offset, bool any_mount) const {
+  LegScore out;
+  const std::vector<LegPose> path = legs_under(hypothesis);
+  const std::vector<Turn> turns = leg_turns(path, interval);
+  const GyroPath gyro_path = gyro();
+  const SO3 described = robot_.imu.T_link_imu.R.inverse();
+  out.axes = described.matrix();
+  out.offset = offset;
+  if (turns.size() < 30) return out;
+  out.explained = explained_by(turns, gyro_path, offset, out.axes);
+  if (any_mount) {
+    const TurnAgreement best = agree(turns, gyro_path, offset);
+    if (best.explained > out.explained && best.axes.determinant() > 0) {
+      out.explained = best.explained;
+      out.axes = best.axes;
+    }
+  }
+  std::vector<double> angles;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  std::size_t k = 0, n = 0;
+  for (const LegPose& pose : path) {
+    const double t = pose.t + offset;
+    if (!gyro_path.covers(t - 0.1, t + 0.1) || gyro_path.rate(t - 0.1, t + 0.1).norm() > 0.05) continue;
+    if (k++ % 20 != 0) continue;
+    const Eigen::Vector3d left = normal_of(pose.foot[0]), right = normal_of(pose.foot[1]);
+    if (left.isZero() || right.isZero()) continue;
+    angles.push_back(angle_between(left, right));
+    sum += left + right;
+    ++n;
+  }
+  if (n < 5) return out;
+  const auto middle = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() / 2);
+  std::ranges::nth_element(angles, middle);
+  out.flatness = *middle;
+  if (any_mount) return out;
+  // Against gravity of the same moments, roughly: the mean over the recording.
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  for (const InertialSample& s : recorded_.imu) up += accel_axes_ * s.accel;
+  out.flatness = std::max(out.flatness, 0.5 * angle_between(sum, out.axes.transpose() * up));
+  return out;
+}
+
+bool Examination::examine_leg_names() {
+  const auto& feet = robot_.feet;
+  const bool swapped = mentions(feet[0].link, "right") && mentions(feet[1].link, "left");
+  if (swapped) {
+    find({Sensor::legs,
+          "feet_swapped",
+          fmt::format("left and right foot are swapped in the configuration: left is {}, right is {}", feet[0].link, feet[1].link),
+          "the names of the links",
+          "robot.feet: exchange the links (and soles) of left and right",
+          0,
+          "",
+          {},
+          true});
+    std::swap(robot_.feet[0], robot_.feet[1]);
+  }
+  double largest = 0;
+  std::size_t beyond = 0, count = 0;
+  for (const LegSample& s : recorded_.legs) {
+    for (const double q : s.position) {
+      largest = std::max(largest, std::abs(q));
+      beyond += std::abs(q) > 6.4 ? 1 : 0;
+      ++count;
+    }
+  }
+  if (count > 0 && beyond > count / 50) {
+    leg_mend_ = degrees_hypothesis();
+    find({Sensor::legs,
+          "joint_unit",
+          "the joint positions are in degrees, not in radians",
+          fmt::format("{:.0f} % of them are beyond a whole turn of 2 pi, the largest is {:.0f}",
+                      100.0 * static_cast<double>(beyond) / static_cast<double>(count), largest),
+          "the driver must publish radians",
+          largest,
+          "",
+          {},
+          true});
+  }
+  std::string why;
+  if (leg_path(recorded_, robot_, nullptr, 0.2, &why).empty()) {
+    find({Sensor::legs,
+          "urdf",
+          fmt::format("the messages of the legs do not fit the URDF: {}", why),
+          fmt::format("the messages have {} joints", recorded_.joint_names.size()),
+          "robot.urdf, or robot.locked_joints",
+          0,
+          "",
+          {},
+          true});
+    return false;
+  }
+  return true;
+}
+
+void Examination::examine_legs() {
+  if (recorded_.legs.size() < 100) return;
+  if (robot_.legs.type != "joints") {
+    check(Sensor::legs, "all", Check::Verdict::unknown, "messages of two feet: nothing to hold them against");
+    return;
+  }
+  if (!examine_leg_names()) return;
+  leg_turns_ = leg_turns(legs_under(nullptr), interval);
+  legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
+  // A clock that is off first: any joint looks wrong at another time.
+  leg_offset_ = legs_.known ? legs_.offset : 0;
+  if (try_leg_hypotheses()) {
+    leg_turns_ = leg_turns(legs_under(nullptr), interval);
+    legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
+  }
+  if (!legs_.known) {
+    // The legs of another robot: the LiDAR and the gyro agree, the legs turn, and under no hypothesis as they do.
+    const std::string detail =
+        fmt::format("{:.0f} % of the legs' turning is that of the gyro at best: no walk, or slow or rough encoders", 100 * legs_.explained);
+    check(Sensor::legs, "mount of the IMU, joints, clock", Check::Verdict::unknown, detail);
+    return;
+  }
+  // Legs that hardly turn show how they bend, not how they are mounted.
+  constexpr double least_turning = 0.15, least_weakest = 0.04;  // rad/s
+  if (legs_.turning < least_turning || legs_.weakest < least_weakest) {
+    check(Sensor::legs, "mount of the IMU, clock", Check::Verdict::unknown,
+          fmt::format("the robot turned by {:.2f} rad/s only, {:.2f} about one of its axes: walk and turn", legs_.turning, legs_.weakest));
+  } else {
+    examine_leg_rotation();
+  }
+  examine_leg_lengths();
+}
+
+bool Examination::try_leg_hypotheses() {
+  const LegScore described = score_legs(nullptr, leg_offset_, false), free = score_legs(nullptr, leg_offset_, true);
+  const double cost = std::min(described.cost(), free.cost());
+  constexpr double well = 0.02;  // of a description that needs no other
+  if (cost < well) return false;
+  const LegHypothesis* best = nullptr;
+  double least = std::min(much_better * cost, cost - well);
+  LegScore score;
+  const std::vector<LegHypothesis> all = leg_hypotheses(recorded_, robot_);
+  for (const LegHypothesis& h : all) {
+    const LegScore other = std::min(score_legs(&h, leg_offset_, false), score_legs(&h, 0, false),
+                                    [](const LegScore& a, const LegScore& b) { return a.cost() < b.cost(); });
+    if (other.cost() >= least || other.explained < least_explained) continue;
+    least = other.cost();
+    best = &h;
+    score = other;
+  }
+  if (best == nullptr) return false;
+  Finding f{best->culprit, best->cause, best->name, {}, best->setting, 0, {}, {}, true};
+  f.evidence = fmt::format(
+      "{:.0f} % of the legs' turning is that of the gyro then, {:.0f} % as described; the soles are {:.1f} and {:.1f} degrees from flat",
+      100 * score.explained, 100 * described.explained, score.flatness, described.flatness);
+  for (const auto& [key, value] : best->changes) f.changes.push_back({key, value});
+  find(std::move(f));
+  leg_mend_ = leg_mend_ ? joined(*leg_mend_, *best) : *best;
+  return true;
+}
+
+void Examination::examine_leg_rotation() {
+  const SO3 described = robot_.imu.T_link_imu.R.inverse();
+  SO3 start = SO3::nearest(legs_.error * described.matrix());
+  if (legs_.agrees) start = described;
+  const GyroPath path = gyro();
+  MountFit fit = fit_mount(leg_turns_, path, start, legs_.offset);
+  const double explained = fit.explained;
+  for (int k = 0; k < 2 && fit.fit.good; ++k) fit = fit_mount(best_half(leg_turns_, path, fit), path, fit.R, fit.offset);
+  fit.explained = explained;
+  if (!fit.fit.good) {
+    check(Sensor::legs, "mount of the IMU", Check::Verdict::unknown, "too few steps");
+    return;
+  }
+  leg_offset_ = fit.offset;
+  const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
+  const double angle = degrees(turn.norm()), uncertain = degrees(fit.rotation_sigma().norm());
+  const std::string detail = fmt::format("{:.1f} degrees from the description, standard deviation {:.1f}; {:.0f} % explained", angle,
+                                         uncertain, 100 * fit.explained);
+  if (angle > std::max(rotation_tolerance, sure * uncertain)) {
+    settle_imu_link(fit.R.inverse());
+    if (!diagnosis_.findings.empty() && diagnosis_.findings.back().cause == "imu_mount_rotation") {
+      diagnosis_.findings.back().turn = turn;
+      diagnosis_.findings.back().evidence = "turning of the legs against the gyro's: " + detail;
+    }
+  } else {
+    check(Sensor::imu, "rotation of its mount on the robot", uncertain > 3 ? Check::Verdict::unknown : Check::Verdict::good, detail);
+  }
+  const double sigma = fit.offset_sigma();
+  const std::string clock = fmt::format("{:.1f} ms against the IMU, standard deviation {:.1f} ms", 1e3 * fit.offset, 1e3 * sigma);
+  if (std::abs(fit.offset) < std::max(clock_tolerance, sure * sigma) || fit.explained < 0.6) {
+    check(Sensor::legs, "clock", fit.explained < 0.6 ? Check::Verdict::unknown : Check::Verdict::good, clock);
+    leg_offset_ = 0;
+  } else {
+    find_offset(Sensor::legs, fit.offset, sigma, "turning of the legs against the gyro's");
+  }
+}
+
+// The IMU sits turned against the description: on another link of the URDF, the wrong way round, or just so. `measured`: R_link_imu.
+void Examination::settle_imu_link(const SO3& measured) {
+  const SO3 described = robot_.imu.T_link_imu.R;
+  const double angle = degrees((measured * described.inverse()).Log().norm());
+  Finding f;
+  f.sensor = Sensor::imu;
+  f.cause = "imu_mount_rotation";
+  if (degrees((measured * described).Log().norm()) < 0.15 * angle + 1) {
+    f.text = "the IMU's mount on the robot is given the wrong way round";
+    const SE3 inverse = robot_.imu.T_link_imu.inverse();
+    robot_.imu.T_link_imu = {measured, inverse.p};
+    f.changes.push_back({"imu.T_link_imu.p", vector_text(inverse.p)});
+    find_rotation(std::move(f), described, inverse.R, "imu.T_link_imu.R");
+    return;
+  }
+  const GyroPath path = gyro();
+  std::string link;
+  double best = legs_.explained - 0.05;
+  double nearest = 0.5 * angle;
+  for (const std::string& name : link_names(robot_.urdf)) {
+    if (name == robot_.imu.link) continue;
+    LegHypothesis h;
+    h.robot = [&name](Robot& r) { r.imu.link = name; };
+    const std::vector<Turn> turns = leg_turns(legs_under(&h), interval);
+    if (turns.size() < 30) continue;
+    const double explained = explained_by(turns, path, leg_offset_, described.inverse().matrix());
+    const MountFit fit = fit_mount(turns, path, described.inverse(), leg_offset_);
+    const double off = degrees((fit.R * described).Log().norm());
+    if (!fit.fit.good || explained < best || off > std::min(nearest, 2.5)) continue;
+    nearest = off;
+    link = name;
+  }
+  if (!link.empty()) {
+    f.cause = "imu_link";
+    f.text = fmt::format("the IMU turns with link {}, not with link {}", link, robot_.imu.link);
+    f.evidence = fmt::format("its mount is {:.1f} degrees from the description on {}, {:.1f} on {}", nearest, link, angle, robot_.imu.link);
+    f.remedy = fmt::format("imu.T_link_imu.link: {}", link);
+    f.size = angle;
+    f.unit = fmt::format("deg");
+    f.changes = {{"imu.T_link_imu.link", link}};
+    robot_.imu.link = link;
+    find(std::move(f));
+    return;
+  }
+  f.text = fmt::format("the IMU is turned on its link {} by {} of the link against the description", robot_.imu.link,
+                       turn_text(measured * described.inverse()));
+  robot_.imu.T_link_imu.R = measured;
+  find_rotation(std::move(f), described, measured, "imu.T_link_imu.R");
+}
+
+}  // namespace kilvo::lab

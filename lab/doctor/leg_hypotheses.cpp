@@ -1,0 +1,147 @@
+#include "lab/doctor/leg_hypotheses.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+#include <regex>
+
+namespace kilvo::lab {
+namespace {
+
+// "left_knee_joint" -> "right_knee_joint"; the same name when it has no side.
+std::string other_side(const std::string& name) {
+  constexpr const char* pairs[][2] = {{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"}};
+  for (const auto& pair : pairs) {
+    for (int k = 0; k < 2; ++k) {
+      const std::string from = pair[k], to = pair[1 - k];
+      if (const auto at = name.find(from); at != std::string::npos) return std::string(name).replace(at, from.size(), to);
+    }
+  }
+  if (name.starts_with("l_")) return "r_" + name.substr(2);
+  if (name.starts_with("r_")) return "l_" + name.substr(2);
+  if (name.starts_with("L_")) return "R_" + name.substr(2);
+  if (name.starts_with("R_")) return "L_" + name.substr(2);
+  return name;
+}
+
+bool has_side(const std::string& name) { return other_side(name) != name; }
+
+// The joints that move a foot when they turn.
+std::vector<std::size_t> joints_that_matter(const Recorded& recorded, const Robot& robot) {
+  std::vector<std::size_t> out;
+  if (recorded.legs.empty()) return out;
+  Recorded one;
+  one.joint_names = recorded.joint_names;
+  one.legs = {recorded.legs[recorded.legs.size() / 2]};
+  const auto before = leg_path(one, robot, nullptr, 0, nullptr);
+  if (before.empty()) return out;
+  for (std::size_t i = 0; i < recorded.joint_names.size(); ++i) {
+    Recorded moved = one;
+    moved.legs[0].position[i] += 0.3;
+    const auto after = leg_path(moved, robot, nullptr, 0, nullptr);
+    if (after.empty()) continue;
+    double change = 0;
+    for (std::size_t f = 0; f < 2; ++f) change += (after[0].foot[f].R_IF.matrix() - before[0].foot[f].R_IF.matrix()).norm();
+    if (change > 1e-6) out.push_back(i);
+  }
+  return out;
+}
+
+LegHypothesis shifted(const std::vector<std::size_t>& joints, int by) {
+  LegHypothesis h;
+  h.cause = "joint_names_shifted";
+  h.name = fmt::format("the joint names are shifted by one against the positions ({})",
+                       by > 0 ? "each name belongs to the position after it" : "each name belongs to the position before it");
+  h.setting = "the driver must publish each position under its own joint's name";
+  h.names = [joints, by](std::vector<std::string>& names) {
+    const std::vector<std::string> old = names;
+    const auto n = static_cast<int>(joints.size());
+    for (int i = 0; i < n; ++i) names[joints[static_cast<std::size_t>((i + by + n) % n)]] = old[joints[static_cast<std::size_t>(i)]];
+  };
+  return h;
+}
+
+}  // namespace
+
+LegHypothesis degrees_hypothesis() {
+  LegHypothesis h;
+  h.cause = "joint_unit";
+  h.position = [](std::size_t, double& q) { q *= 0.017453292519943295; };
+  return h;
+}
+
+LegHypothesis joined(const LegHypothesis& a, const LegHypothesis& b) {
+  LegHypothesis out = b;
+  if (a.robot) {
+    out.robot = [f = a.robot, g = b.robot](Robot& r) {
+      f(r);
+      if (g) g(r);
+    };
+  }
+  if (a.names) {
+    out.names = [f = a.names, g = b.names](std::vector<std::string>& n) {
+      f(n);
+      if (g) g(n);
+    };
+  }
+  if (a.position) {
+    out.position = [f = a.position, g = b.position](std::size_t i, double& q) {
+      f(i, q);
+      if (g) g(i, q);
+    };
+  }
+  return out;
+}
+
+std::vector<LegHypothesis> leg_hypotheses(const Recorded& recorded, const Robot& robot) {
+  std::vector<LegHypothesis> out;
+  const std::vector<std::size_t> joints = joints_that_matter(recorded, robot);
+  const auto& names = recorded.joint_names;
+  if (std::ranges::any_of(joints, [&](std::size_t i) { return has_side(names[i]); })) {
+    LegHypothesis h;
+    h.cause = "joints_swapped";
+    h.name = "the joints of the left and of the right leg are exchanged in the messages";
+    h.setting = "the driver must publish each position under its own joint's name";
+    h.names = [](std::vector<std::string>& all) {
+      for (std::string& name : all) name = other_side(name);
+    };
+    out.push_back(h);
+  }
+  std::vector<std::size_t> every;
+  for (std::size_t i = 0; i < names.size(); ++i) every.push_back(i);
+  for (const int by : {1, -1}) {
+    out.push_back(shifted(joints, by));
+    if (joints.size() != every.size()) out.push_back(shifted(every, by));
+  }
+  for (const std::string& link : link_names(robot.urdf)) {
+    if (link == robot.imu.link || has_side(link)) continue;
+    LegHypothesis h;
+    h.cause = "imu_link";
+    h.culprit = Sensor::imu;
+    h.name = fmt::format("the IMU turns with link {}, not with link {}", link, robot.imu.link);
+    h.setting = fmt::format("imu.T_link_imu.link: {}", link);
+    h.changes = {{"imu.T_link_imu.link", link}};
+    h.robot = [link](Robot& r) { r.imu.link = link; };
+    out.push_back(h);
+  }
+  for (const std::size_t i : joints) {
+    LegHypothesis h;
+    h.cause = "joint_sign";
+    h.name = fmt::format("joint {} turns the other way round", names[i]);
+    h.setting = fmt::format("the axis of joint {} in robot.urdf, or its sign in the driver", names[i]);
+    h.position = [i](std::size_t j, double& q) {
+      if (j == i) q = -q;
+    };
+    out.push_back(h);
+  }
+  return out;
+}
+
+std::vector<std::string> link_names(const std::string& urdf) {
+  std::vector<std::string> out;
+  const std::regex pattern("<link\\s+name\\s*=\\s*\"([^\"]+)\"");
+  for (std::sregex_iterator it(urdf.begin(), urdf.end(), pattern), end; it != end; ++it) out.push_back((*it)[1]);
+  return out;
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,20 @@
+// What may be wrong with the description of legs or with their messages: changes that a recording can be tried with.
+#pragma once
+
+#include "lab/doctor/leg_path.hpp"
+
+namespace kilvo::lab {
+
+/// Names that are exchanged or shifted, joints that turn the other way.
+std::vector<LegHypothesis> leg_hypotheses(const Recorded& recorded, const Robot& robot);
+
+/// Joint positions are in degrees.
+LegHypothesis degrees_hypothesis();
+
+/// Both, the first one first.
+LegHypothesis joined(const LegHypothesis& a, const LegHypothesis& b);
+
+/// Links and joints of a URDF, in the order of the document.
+std::vector<std::string> link_names(const std::string& urdf);
+
+}  // namespace kilvo::lab

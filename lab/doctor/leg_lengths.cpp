@@ -1,0 +1,229 @@
+// The way of the legs against that of the LiDAR: lengths of the URDF, height of the IMU.
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+
+#include "lab/doctor/examination.hpp"
+#include "lab/doctor/leg_hypotheses.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double window = 1.0;              // s, of a displacement
+constexpr double least_way = 0.12;          // m in a window
+constexpr double scale_tolerance = 0.035;   // soles that slip and roll take 1 %
+constexpr double height_tolerance = 0.028;  // m: ground that gives way takes 2 cm
+constexpr double sure = 4;                  // standard deviations
+
+struct Lowest {
+  std::size_t foot = 0, corner = 0;
+  double height = 1e9;
+};
+
+Lowest lowest_of(const LegPose& pose, const Eigen::Vector3d& up_link) {
+  Lowest out;
+  for (std::size_t f = 0; f < 2; ++f) {
+    for (int i = 0; i < pose.foot[f].corners; ++i) {
+      const double height = up_link.dot(pose.foot[f].p[static_cast<std::size_t>(i)]);
+      if (height < out.height) out = {f, static_cast<std::size_t>(i), height};
+    }
+  }
+  return out;
+}
+
+// Height of the LiDAR above the floor: of the lowest dense layer of points around the robot while it stands.
+std::optional<double> height_by_lidar(const std::vector<Sweep>& sweeps, const std::vector<SweepPose>& way, const Eigen::Vector3d& up_W,
+                                      double still_until) {
+  constexpr double layer = 0.01;  // m
+  std::vector<int> counts(400, 0);
+  int all = 0;
+  for (std::size_t i = 0; i < std::min(way.size(), sweeps.size()); ++i) {
+    if (!way[i].good || way[i].t > still_until) continue;
+    for (const TimedPoint& p : sweeps[i].points) {
+      const Eigen::Vector3d x = way[i].T_WL.R * p.p.cast<double>();
+      const double height = up_W.dot(x), along = (x - height * up_W).norm();
+      if (height > -0.2 || height < -3.9 || along > 3) continue;
+      ++counts[static_cast<std::size_t>(-height / layer)];
+      ++all;
+    }
+  }
+  if (all < 500) return std::nullopt;
+  // The floor: the layer of most points, and their mean about it.
+  std::size_t best = 0;
+  for (std::size_t k = 2; k + 2 < counts.size(); ++k) {
+    const auto sum = [&](std::size_t j) { return counts[j - 2] + counts[j - 1] + counts[j] + counts[j + 1] + counts[j + 2]; };
+    if (best < 2 || sum(k) > sum(best)) best = k;
+  }
+  if (best < 4 || best + 4 >= counts.size()) return std::nullopt;
+  double sum = 0, n = 0;
+  for (std::size_t k = best - 4; k <= best + 4; ++k) {
+    sum += counts[k] * (static_cast<double>(k) + 0.5) * layer;
+    n += counts[k];
+  }
+  if (n < 0.15 * all) return std::nullopt;
+  return sum / n;
+}
+
+/// The robot walks over the lowest corner of its soles; in windows of a second its way is held against the LiDAR's.
+class WayOfLegs {
+ public:
+  WayOfLegs(const Eigen::Vector3d& up_W, const Eigen::Vector3d& p_link_lidar) : up_W_(up_W), p_link_lidar_(p_link_lidar) {}
+
+  /// `T_W`: the link by the LiDAR, if known.
+  void add(double t, const LegPose& pose, const std::optional<SE3>& T_W, bool still) {
+    if (!T_W) {
+      last_.reset();
+      return;
+    }
+    const Eigen::Vector3d up = T_W->R.inverse() * up_W_;
+    still_ = still_ && still;
+    if (still_) {
+      if (heights_.empty()) still_from_ = t;
+      still_until_ = t;
+      heights_.push_back(up.dot(p_link_lidar_) - lowest_of(pose, up).height);
+    }
+    if (last_ && t - last_t_ < 0.05) {
+      const Lowest stands = lowest_of(last_pose_, last_->R.inverse() * up_W_);
+      by_legs_ -= T_W->R * pose.foot[stands.foot].p[stands.corner] - last_->R * last_pose_.foot[stands.foot].p[stands.corner];
+    } else {
+      begin(t, *T_W);
+    }
+    if (t - begin_ >= window) {
+      const Eigen::Vector3d way = flat(T_W->p - from_);
+      if (way.norm() > least_way) ratios_.push_back(flat(by_legs_).dot(way) / way.squaredNorm());
+      begin(t, *T_W);
+    }
+    last_ = T_W;
+    last_pose_ = pose;
+    last_t_ = t;
+  }
+
+  /// Way by the legs through way by the LiDAR, and its standard deviation.
+  std::pair<double, double> scale() const {
+    if (ratios_.size() < 5) return {1, INFINITY};
+    std::vector<double> sorted = ratios_;
+    std::ranges::sort(sorted);
+    const std::size_t n = sorted.size();
+    const double spread = sorted[n * 3 / 4] - sorted[n / 4];
+    return {sorted[n / 2], 0.74 * 1.25 * spread / std::sqrt(static_cast<double>(n))};
+  }
+  std::size_t windows() const { return ratios_.size(); }
+  /// From the lowest corner up to the LiDAR while the robot stands at the beginning.
+  std::optional<double> height() const {
+    if (heights_.size() < 50 || still_until_ - still_from_ < 0.8) return std::nullopt;
+    std::vector<double> sorted = heights_;
+    std::ranges::sort(sorted);
+    return sorted[sorted.size() / 2];
+  }
+  double still_until() const { return still_until_; }
+
+ private:
+  Eigen::Vector3d flat(const Eigen::Vector3d& v) const { return v - up_W_ * up_W_.dot(v); }
+  void begin(double t, const SE3& T_W) {
+    begin_ = t;
+    from_ = T_W.p;
+    by_legs_.setZero();
+  }
+
+  Eigen::Vector3d up_W_, p_link_lidar_;
+  std::optional<SE3> last_;
+  LegPose last_pose_;
+  double last_t_ = -1, begin_ = 0, still_from_ = 0, still_until_ = -1;
+  Eigen::Vector3d by_legs_ = Eigen::Vector3d::Zero(), from_ = Eigen::Vector3d::Zero();
+  bool still_ = true;
+  std::vector<double> ratios_, heights_;
+};
+
+}  // namespace
+
+void Examination::examine_leg_lengths() {
+  if (!translation_ || way_.empty() || translation_->g_W.norm() < 5) {
+    check(Sensor::legs, "lengths of the legs", Check::Verdict::unknown, "no LiDAR whose way is known");
+    return;
+  }
+  const GyroPath path = gyro();
+  const Eigen::Vector3d up_W = -translation_->g_W.normalized();
+  const SE3 T_link_imu = robot_.imu.T_link_imu, T_link_lidar = T_link_imu * robot_.lidar.T_imu_lidar;
+  const LidarWay lidar = lidar_way();
+  WayOfLegs way(up_W, T_link_lidar.p);
+  for (const LegPose& pose : legs_under(nullptr)) {
+    const double t = pose.t + leg_offset_;
+    const auto T_WI = lidar.at(t, path);
+    const bool inside = T_WI && path.covers(t - 0.1, t + 0.1);
+    way.add(t, pose, inside ? std::optional(*T_WI * T_link_imu.inverse()) : std::nullopt,
+            inside && path.rate(t - 0.1, t + 0.1).norm() < 0.06);
+  }
+  const auto [scale, sigma] = way.scale();
+  std::optional<double> height;
+  if (const auto by_legs = way.height()) {
+    if (const auto by_points = height_by_lidar(recorded_.sweeps, way_, up_W, way.still_until())) height = *by_legs - *by_points;
+  }
+  const bool scale_wrong = std::abs(scale - 1) > std::max(scale_tolerance, sure * sigma);
+  // A LiDAR that was found elsewhere is known to some centimetres only.
+  const bool moved = std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "lidar_position"; });
+  const bool height_wrong = height && std::abs(*height) > (moved ? 3 : 1) * height_tolerance;
+  const std::string detail = fmt::format(
+      "way by the legs / way by the LiDAR {:.3f}, standard deviation {:.3f}, in {} s; height of the LiDAR by the legs less that by its "
+      "points {}",
+      scale, sigma, way.windows(), height ? fmt::format("{:.1f} cm", 100 * *height) : "unknown");
+  if (!scale_wrong && !height_wrong) {
+    check(Sensor::legs, "lengths of the legs", std::isfinite(sigma) ? Check::Verdict::good : Check::Verdict::unknown, detail);
+    return;
+  }
+  // Legs that are too long walk too far and stand too high; an IMU that is too high only stands too high.
+  const bool lengths = height_wrong ? (scale - 1) * *height > 0 && std::abs(scale - 1) > 0.02 : true;
+  if (lengths) {
+    accuse_leg_lengths(scale, height.value_or(0));
+  } else {
+    accuse_imu_place(*height);
+  }
+  diagnosis_.findings.back().evidence = detail;
+}
+
+void Examination::accuse_leg_lengths(double scale, double height) {
+  Finding f{Sensor::legs, "leg_lengths", {}, {}, {}, scale - 1, {}, {}, true};
+  f.text = fmt::format("the legs of the URDF are too {}: the robot walks {:.1f} % {} by its legs than by the LiDAR and stands {:.1f} cm {}",
+                       scale > 1 ? "long" : "short", 100 * std::abs(scale - 1), scale > 1 ? "farther" : "less far", 100 * std::abs(height),
+                       height > 0 ? "higher" : "lower");
+  f.remedy = "robot.urdf: the lengths of thigh and shin, or the URDF of this robot";
+  find(std::move(f));
+}
+
+// Another link that turns with this one would put the IMU at the right height: then the link is wrong, else the place on it.
+std::string Examination::link_at_height(double height) const {
+  const std::vector<LegPose> here = legs_under(nullptr);
+  if (here.empty() || !translation_ || way_.empty()) return "";
+  const Eigen::Vector3d up_I =
+      robot_.lidar.T_imu_lidar.R * (way_.front().T_WL.R.inverse() * Eigen::Vector3d(-translation_->g_W.normalized()));
+  const Eigen::Vector3d up = robot_.imu.T_link_imu.R * up_I;
+  for (const std::string& name : link_names(robot_.urdf)) {
+    if (name == robot_.imu.link) continue;
+    LegHypothesis h;
+    h.robot = [&name](Robot& r) { r.imu.link = name; };
+    const std::vector<LegPose> there = legs_under(&h);
+    if (there.size() != here.size()) continue;
+    const auto same = [&](std::size_t i) {
+      const FootPose &a = here[i].foot[0], &b = there[i].foot[0];
+      const double moved = up.dot(b.p[0] - a.p[0]);
+      // Feet that lie higher in the link's frame let the LiDAR stand lower.
+      return (b.R_IF.inverse() * a.R_IF).Log().norm() < 0.02 && std::abs(height - moved) < 0.5 * height_tolerance;
+    };
+    if (same(0) && same(here.size() / 2) && same(here.size() - 1)) return name;
+  }
+  return "";
+}
+
+void Examination::accuse_imu_place(double height) {
+  Finding f{Sensor::imu, "imu_mount_position", {}, {}, {}, height, fmt::format("m"), {}, true};
+  f.text = fmt::format("the IMU sits {:.1f} cm {} on the robot than described", 100 * std::abs(height), height > 0 ? "lower" : "higher");
+  f.remedy = "imu.T_link_imu.p, or its link";
+  if (const std::string link = link_at_height(height); !link.empty()) {
+    f.cause = "imu_link";
+    f.text += fmt::format(": as if on link {} instead of {}", link, robot_.imu.link);
+    f.remedy = fmt::format("imu.T_link_imu.link: {}", link);
+    f.changes = {{"imu.T_link_imu.link", link}};
+  }
+  find(std::move(f));
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,58 @@
+#include "lab/doctor/leg_path.hpp"
+
+#include <stdexcept>
+
+namespace kilvo::lab {
+
+std::vector<LegPose> leg_path(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, double period,
+                              std::string* why) {
+  std::vector<LegPose> out;
+  Robot of_link = robot;
+  of_link.imu.T_link_imu = SE3{};  // the IMU's mount is what shall be judged
+  if (hypothesis != nullptr && hypothesis->robot) hypothesis->robot(of_link);
+  JointSample sample;
+  sample.names = recorded.joint_names;
+  if (hypothesis != nullptr && hypothesis->names) hypothesis->names(sample.names);
+  try {
+    LegKinematics kinematics(of_link);
+    double last = -1e9;
+    for (const LegSample& leg : recorded.legs) {
+      if (leg.t - last < period) continue;
+      sample.t = time_from_ns(0) + from_seconds(leg.t);
+      sample.position = leg.position;
+      sample.velocity.assign(leg.position.size(), 0);
+      if (hypothesis != nullptr && hypothesis->position) {
+        for (std::size_t i = 0; i < sample.position.size(); ++i) hypothesis->position(i, sample.position[i]);
+      }
+      const auto feet = kinematics.feet(sample);
+      if (const auto* reason = std::get_if<std::string>(&feet)) {
+        if (why != nullptr) *why = *reason;
+        continue;
+      }
+      last = leg.t;
+      out.push_back({leg.t, std::get<Feet>(feet).foot});
+    }
+  } catch (const std::invalid_argument& error) {
+    if (why != nullptr) *why = error.what();
+  }
+  return out;
+}
+
+std::vector<Turn> leg_turns(const std::vector<LegPose>& path, double interval) {
+  std::vector<Turn> out;
+  for (std::size_t i = 0, j = 0; i < path.size(); i = j) {
+    j = i + 1;
+    while (j < path.size() && path[j].t - path[i].t < interval - 1e-4) ++j;
+    if (j >= path.size()) break;
+    if (path[j].t - path[i].t > 2 * interval) continue;  // a gap
+    Turn turn{path[i].t, path[j].t, {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}, 2};
+    for (std::size_t f = 0; f < 2; ++f) {
+      // The foot stands still: R_W,link = R_WF R_link,F^T.
+      turn.theta[f] = (path[i].foot[f].R_IF * path[j].foot[f].R_IF.inverse()).Log();
+    }
+    out.push_back(turn);
+  }
+  return out;
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,234 @@
+// The LiDAR: the times of its points, the rotation and the position of its mount, its clock.
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+
+#include "lab/doctor/examination.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+// A careful mount reaches a tenth of this.
+constexpr double rotation_tolerance = 0.7;   // degrees
+constexpr double worth_a_note = 0.08;        // degrees
+constexpr double clock_tolerance = 0.0035;   // s
+constexpr double position_tolerance = 0.05;  // m
+constexpr double sure = 4;                   // standard deviations
+
+double mean_thickness(const std::vector<SweepPose>& way) {
+  double sum = 0, n = 0;
+  for (const SweepPose& p : way) {
+    if (!p.good || p.thickness == 0) continue;
+    sum += p.thickness;
+    n += 1;
+  }
+  return n > 0 ? sum / n : INFINITY;
+}
+
+std::vector<Turn> turns_of(const std::vector<SweepPose>& way) {
+  std::vector<Turn> out;
+  for (std::size_t i = 1; i < way.size(); ++i) {
+    const SweepPose &a = way[i - 1], &b = way[i];
+    if (a.good && b.good && b.t - a.t < 0.6 && b.t > a.t)
+      out.push_back({a.t, b.t, {(a.T_WL.R.inverse() * b.T_WL.R).Log(), Eigen::Vector3d::Zero()}, 1});
+  }
+  return out;
+}
+
+}  // namespace
+
+void Examination::examine_lidar() {
+  if (recorded_.sweeps.size() < 30) return;
+  if (!lidar_.known) {
+    check(Sensor::lidar, "mount and clock", Check::Verdict::unknown,
+          fmt::format("its sweeps do not turn as the gyro does under any mount ({:.0f} % explained), or hardly turn: walk and turn",
+                      100 * lidar_.explained));
+    return;
+  }
+  const std::size_t before = diagnosis_.findings.size();
+  examine_point_times();
+  examine_lidar_rotation();
+  // Without times a sweep is taken at its stamp: that half a sweep is missing is no fault of the clock.
+  if (diagnosis_.findings.size() > before && diagnosis_.findings[before].cause == "point_times_absent") return;
+  examine_lidar_clock();
+  examine_lidar_position();
+}
+
+// Deskewed with the right times the surroundings are sharpest.
+void Examination::examine_point_times() {
+  double span = 0;
+  for (const Sweep& s : recorded_.sweeps) span = std::max(span, s.end - s.begin);
+  if (span < 1e-4) {
+    find({Sensor::lidar,
+          "point_times_absent",
+          "all points of a sweep have the same time",
+          fmt::format("the longest sweep lasts {:.3f} ms by its points", 1e3 * span),
+          "the driver must publish point times (or kilvo run --no-deskew for a LiDAR that measures at once)",
+          span,
+          "s",
+          {},
+          true});
+    return;
+  }
+  const GyroPath path = gyro();
+  const SO3 start = SO3::nearest(lidar_.error * robot_.lidar.T_imu_lidar.R.matrix());
+  const MountFit fit = fit_mount(lidar_turns_, path, start, lidar_.offset);
+  Deskew deskew{&path, fit.fit.good ? fit.R : start, fit.fit.good ? fit.offset : lidar_.offset, false};
+  // The stretch that turns most.
+  std::size_t best = 0;
+  double most = -1;
+  constexpr std::size_t stretch = 70;
+  std::vector<double> sums(recorded_.sweeps.size() + 1, 0);
+  for (std::size_t i = 0; i < recorded_.sweeps.size(); ++i) {
+    const Sweep& s = recorded_.sweeps[i];
+    sums[i + 1] = sums[i] + (path.covers(s.begin, s.end) && s.end > s.begin ? path.rate(s.begin, s.end).norm() : 0);
+  }
+  for (std::size_t i = 0; i + stretch < sums.size(); ++i) {
+    if (sums[i + stretch] - sums[i] <= most) continue;
+    most = sums[i + stretch] - sums[i];
+    best = i;
+  }
+  const OdometryRange range{best, best + stretch};
+  const double forward = mean_thickness(scan_odometry(recorded_.sweeps, deskew, range));
+  deskew.reversed = true;
+  const double backward = mean_thickness(scan_odometry(recorded_.sweeps, deskew, range));
+  const double rigid = mean_thickness(scan_odometry(recorded_.sweeps, {}, range));
+  const std::string evidence =
+      fmt::format("surfaces are {:.1f} mm thick with the points' times, {:.1f} mm with reversed ones, {:.1f} mm without", 1e3 * forward,
+                  1e3 * backward, 1e3 * rigid);
+  constexpr double clearly = 0.9;
+  if (backward < clearly * forward && backward < rigid) {
+    find({Sensor::lidar,
+          "point_times_reversed",
+          "the points' times run backwards within a sweep",
+          evidence,
+          "the driver must publish the time of each point from the beginning of the sweep",
+          0,
+          "",
+          {},
+          true});
+    deskew.reversed = true;
+  } else {
+    check(Sensor::lidar, "point times", forward <= rigid / clearly ? Check::Verdict::good : Check::Verdict::note, evidence);
+    deskew.reversed = false;
+  }
+  way_ = scan_odometry(recorded_.sweeps, deskew);
+  // Once more with the mount and the clock that follow: sweeps taken as rigid shift both a little.
+  const MountFit again = fit_mount(turns_of(way_), path, deskew.R_IL, deskew.offset);
+  if (!again.fit.good) return;
+  deskew.R_IL = again.R;
+  deskew.offset = again.offset;
+  way_ = scan_odometry(recorded_.sweeps, deskew);
+}
+
+void Examination::examine_lidar_rotation() {
+  const std::vector<Turn> turns = way_.empty() ? lidar_turns_ : turns_of(way_);
+  if (way_.empty()) way_ = rigid_;
+  const SO3 described = robot_.lidar.T_imu_lidar.R;
+  const SO3 start = SO3::nearest(lidar_.error * described.matrix());
+  const MountFit fit = fit_mount(turns, gyro(), start, lidar_.offset);
+  if (!fit.fit.good) {
+    check(Sensor::lidar, "rotation of the mount", Check::Verdict::unknown, "too few sweeps could be registered");
+    return;
+  }
+  lidar_.offset = fit.offset;
+  lidar_.error = (fit.R * described.inverse()).matrix();
+  lidar_offset_ = fit.offset;
+  const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
+  const double angle = degrees(turn.norm());
+  const Eigen::Vector3d sigma = fit.R * fit.rotation_sigma();
+  const double uncertain = degrees(sigma.norm());
+  const std::string detail = fmt::format("{:.2f} degrees from the description, standard deviation {:.2f}", angle, uncertain);
+  if (angle < std::max(rotation_tolerance, sure * uncertain)) {
+    const bool note = angle > worth_a_note && angle > 3 * uncertain;
+    check(Sensor::lidar, "rotation of the mount",
+          uncertain > 5 ? Check::Verdict::unknown
+          : note        ? Check::Verdict::note
+                        : Check::Verdict::good,
+          detail + (note ? ": could be calibrated" : ""));
+    if (angle < rotation_tolerance) return;  // else: not sure, but the likeliest
+    return;
+  }
+  Finding f;
+  f.sensor = Sensor::lidar;
+  f.cause = "lidar_rotation";
+  f.turn = turn;
+  const SE3 inverse = robot_.lidar.T_imu_lidar.inverse();
+  const bool inverted = degrees((fit.R * inverse.R.inverse()).Log().norm()) < std::max(0.15 * angle, 3 * uncertain);
+  if (inverted) {
+    f.text = fmt::format("the LiDAR's mount is given the wrong way round (lidar from IMU): {} off", turn_text(SO3::Exp(turn)));
+    f.cause = "lidar_inverted";
+    robot_.lidar.T_imu_lidar.p = inverse.p;
+    f.changes.push_back({"lidar.T_imu_lidar.p", vector_text(inverse.p)});
+  } else {
+    const SO3 in_lidar = described.inverse() * fit.R;
+    f.text = fmt::format("the LiDAR is turned against its description by {} of the LiDAR", turn_text(in_lidar));
+  }
+  f.evidence = fmt::format("{:.1f} % of the turning of its sweeps is that of the gyro with this mount, {:.1f} % as described; {}",
+                           100 * fit.explained, 100 * lidar_.as_described, detail);
+  robot_.lidar.T_imu_lidar.R = fit.R;
+  find_rotation(std::move(f), described, fit.R, "lidar.T_imu_lidar.R");
+}
+
+void Examination::examine_lidar_clock() {
+  const MountFit fit =
+      fit_mount(turns_of(way_), gyro(), SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix()), lidar_.offset);
+  if (!fit.fit.good) return;
+  const double sigma = fit.offset_sigma();
+  lidar_offset_ = fit.offset;
+  const std::string detail = fmt::format("{:.2f} ms against the IMU, standard deviation {:.2f} ms", 1e3 * fit.offset, 1e3 * sigma);
+  if (std::abs(fit.offset) < std::max(clock_tolerance, sure * sigma)) {
+    const bool note = std::abs(fit.offset) > 0.0008 && std::abs(fit.offset) > 3 * sigma;
+    check(Sensor::lidar, "clock", note ? Check::Verdict::note : Check::Verdict::good, detail + (note ? ": could be calibrated" : ""));
+    return;
+  }
+  find_offset(Sensor::lidar, fit.offset, sigma, "turning of the sweeps against the gyro's");
+  robot_.lidar.time_offset += fit.offset;
+}
+
+void Examination::examine_lidar_position() {
+  const SO3 R_IL = SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix());
+  const TranslationRows rows(way_, recorded_.imu, gyro(), R_IL, lidar_offset_);
+  translation_ = rows.fit(accel_axes_);
+  if (!translation_) {
+    check(Sensor::lidar, "position of the mount", Check::Verdict::unknown, "too few sweeps in a row that know their way");
+    return;
+  }
+  const TranslationFit& fit = *translation_;
+  const Eigen::Vector3d described = robot_.lidar.T_imu_lidar.p, error = fit.r - described;
+  const Eigen::Vector3d sigma(fit.sigma_r(0), fit.sigma_r(1), fit.sigma_r(2));
+  bool wrong = false;
+  for (int i = 0; i < 3; ++i) wrong |= std::abs(error[i]) > std::max(position_tolerance, sure * sigma[i]);
+  const std::string detail =
+      fmt::format("measured ({:.3f}, {:.3f}, {:.3f}) m, standard deviations ({:.3f}, {:.3f}, {:.3f}), described ({:.3f}, {:.3f}, {:.3f})",
+                  fit.r.x(), fit.r.y(), fit.r.z(), sigma.x(), sigma.y(), sigma.z(), described.x(), described.y(), described.z());
+  if (!wrong) {
+    check(Sensor::lidar, "position of the mount", sigma.maxCoeff() > 0.05 ? Check::Verdict::unknown : Check::Verdict::good, detail);
+    return;
+  }
+  Finding f{Sensor::lidar, "lidar_position", "", detail, "", error.norm(), "m", {}, true};
+  const Eigen::Vector3d inverse = -(R_IL.inverse() * described);
+  const double tolerance = std::max(0.02, 3 * sigma.norm());
+  Eigen::Vector3d right = described;
+  for (int i = 0; i < 3; ++i) {
+    if (std::abs(error[i]) > std::max(3 * sigma[i], 0.6 * position_tolerance)) right[i] = std::round(1e3 * fit.r[i]) / 1e3;
+  }
+  if (described.norm() > 3) {
+    f.cause = "lidar_unit";
+    f.text = fmt::format("the LiDAR's position of {:.0f} m on the IMU is in millimetres", described.norm());
+    right = 1e-3 * described;
+  } else if ((fit.r - inverse).norm() < tolerance && (fit.r - inverse).norm() < 0.5 * error.norm()) {
+    f.cause = "lidar_inverted";
+    f.text = "the LiDAR's mount is given the wrong way round (the IMU in the LiDAR's frame)";
+    right = inverse;
+  } else {
+    f.text = fmt::format("the LiDAR is {:.0f} cm from where it is described, ({:.2f}, {:.2f}, {:.2f}) m off", 100 * error.norm(), error.x(),
+                         error.y(), error.z());
+  }
+  f.remedy = fmt::format("lidar.T_imu_lidar.p: {}", vector_text(right));
+  f.changes = {{"lidar.T_imu_lidar.p", vector_text(right)}};
+  robot_.lidar.T_imu_lidar.p = right;
+  find(std::move(f));
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,90 @@
+#include "lab/doctor/recorded.hpp"
+
+#include <algorithm>
+
+namespace kilvo::lab {
+namespace {
+
+constexpr std::size_t points_of_a_sweep = 6000;
+constexpr double leg_period = 0.0039;  // s
+constexpr float nearest = 0.5F;        // m: nearer points may be the robot's own arms
+
+}  // namespace
+
+double Recorder::seconds(Time t) {
+  if (!begun_) recorded_.origin = to_ns(t);
+  begun_ = true;
+  return 1e-9 * static_cast<double>(to_ns(t) - recorded_.origin);
+}
+
+void Recorder::push(const Measurement& measurement) {
+  const double t = seconds(stamp_of(measurement));
+  times_[static_cast<std::size_t>(sensor_of(measurement))].push_back(t);
+  std::visit([this](const auto& m) { take(m); }, measurement);
+}
+
+void Recorder::take(const ImuSample& sample) {
+  if (sample.gyro.allFinite() && sample.accel.allFinite()) recorded_.imu.push_back({seconds(sample.t), sample.gyro, sample.accel});
+}
+
+void Recorder::take(const JointSample& sample) {
+  const double t = seconds(sample.t);
+  if (t - last_leg_ < leg_period && t >= last_leg_) return;
+  if (!std::ranges::all_of(sample.position, [](double q) { return std::isfinite(q); })) return;
+  if (recorded_.joint_names.empty()) recorded_.joint_names = sample.names;
+  if (sample.names != recorded_.joint_names) {
+    recorded_.joint_names_change = true;
+    return;
+  }
+  last_leg_ = t;
+  recorded_.legs.push_back({t, sample.position});
+}
+
+void Recorder::take(const LidarScan& scan) {
+  if (scan.points.empty()) return;
+  Sweep sweep;
+  sweep.t = seconds(scan.t);
+  const std::size_t step = std::max<std::size_t>(1, scan.points.size() / points_of_a_sweep);
+  // A step that shares no factor with the number of lines, so that no line is left out.
+  for (std::size_t i = 0; i < scan.points.size(); i += step | 1U) {
+    const LidarPoint& p = scan.points[i];
+    const Eigen::Vector3f x(p.x, p.y, p.z);
+    const float range = x.norm();
+    if (!(range > nearest && range < 200)) continue;
+    sweep.points.push_back({x, 1e-9F * static_cast<float>(p.offset_ns)});
+  }
+  if (sweep.points.size() < 50) return;
+  const auto [low, high] = std::ranges::minmax(sweep.points, {}, &TimedPoint::t);
+  sweep.begin = sweep.t + static_cast<double>(low.t);
+  sweep.end = sweep.t + static_cast<double>(high.t);
+  recorded_.sweeps.push_back(std::move(sweep));
+}
+
+void Recorder::take(const CameraImage& image) {
+  if (image.image.empty()) return;
+  recorded_.image_width = image.image.width;
+  recorded_.image_height = image.image.height;
+  if (auto pair = tracker_.push(seconds(image.t), image.image)) recorded_.tracks.push_back(*std::move(pair));
+}
+
+Recorded Recorder::finish() {
+  const auto by_time = [](const auto& a, const auto& b) { return a.t < b.t; };
+  std::ranges::stable_sort(recorded_.imu, by_time);
+  std::ranges::stable_sort(recorded_.legs, by_time);
+  std::ranges::stable_sort(recorded_.sweeps, by_time);
+  for (std::size_t s = 0; s < sensor_count; ++s) {
+    std::vector<double>& t = times_[s];
+    std::ranges::sort(t);
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < t.size(); ++i) steps.push_back(t[i] - t[i - 1]);
+    recorded_.stamps[s].count = t.size();
+    if (steps.empty()) continue;
+    // With whole seconds between the ends, a median would be fooled by stamps that come in bursts.
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::ranges::nth_element(steps, middle);
+    recorded_.stamps[s].period = *middle;
+  }
+  return std::move(recorded_);
+}
+
+}  // namespace kilvo::lab

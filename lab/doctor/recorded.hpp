@@ -1,0 +1,75 @@
+// What the checks look at: the samples of a recording, by sensor, sorted by their stamps and thinned, without any use of the mounts.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kilvo/sensors/measurement.hpp"
+#include "lab/doctor/feature_tracks.hpp"
+
+namespace kilvo::lab {
+
+/// A LiDAR point and when it was measured.
+struct TimedPoint {
+  Eigen::Vector3f p;  // m, LiDAR frame
+  float t = 0;        // s after the stamp of its sweep
+};
+
+struct Sweep {
+  double t = 0;               // s, stamp
+  double begin = 0, end = 0;  // s, of the first and the last point
+  std::vector<TimedPoint> points;
+};
+
+struct InertialSample {
+  double t = 0;
+  Eigen::Vector3d gyro, accel;  // as they came
+};
+
+struct LegSample {
+  double t = 0;
+  std::vector<double> position;
+};
+
+struct StampStatistics {
+  std::size_t count = 0;
+  double period = 0;  // s, median between stamps
+};
+
+/// Times are seconds since `origin`, the first stamp of all.
+struct Recorded {
+  std::int64_t origin = 0;  // ns
+  std::vector<InertialSample> imu;
+  std::vector<std::string> joint_names;
+  std::vector<LegSample> legs;  // at most 250 per second
+  std::vector<Sweep> sweeps;
+  std::vector<TrackedPair> tracks;  // of consecutive images
+  int image_width = 0, image_height = 0;
+  std::array<StampStatistics, sensor_count> stamps;
+  bool joint_names_change = false;
+};
+
+/// Takes measurements in the order in which they arrive.
+class Recorder {
+ public:
+  void push(const Measurement& measurement);
+  /// Everything so far, sorted.
+  Recorded finish();
+
+ private:
+  double seconds(Time t);
+  void take(const ImuSample& sample);
+  void take(const JointSample& sample);
+  void take(const LidarScan& scan);
+  void take(const CameraImage& image);
+
+  Recorded recorded_;
+  bool begun_ = false;
+  std::array<std::vector<double>, sensor_count> times_;
+  double last_leg_ = -1e9;
+  FeatureTracker tracker_;
+};
+
+}  // namespace kilvo::lab

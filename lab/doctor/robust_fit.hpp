@@ -1,0 +1,46 @@
+// Least squares over rows with outliers: Gauss-Newton with Cauchy's weights, the scale learnt from the rows themselves, and a covariance
+// from the scatter of blocks of rows (which may depend on each other within a block). A. C. Cameron, D. L. Miller, "A practitioner's guide
+// to cluster-robust inference", 2015.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+namespace kilvo::lab {
+
+/// Residuals of groups of rows (a group is weighed as one), and the block in time that each group belongs to.
+struct Residuals {
+  int width = 3;           // rows of a group
+  std::vector<double> r;   // width * groups
+  std::vector<int> block;  // per group, not decreasing
+  void clear() {
+    r.clear();
+    block.clear();
+  }
+  std::size_t groups() const { return block.size(); }
+};
+
+struct Fit {
+  bool good = false;  // enough rows, a solution within its steps
+  Eigen::VectorXd x;
+  Eigen::MatrixXd cov;  // of x, from the scatter of the blocks
+  double scale = 0;     // robust standard deviation of one row
+  double cost = 0;      // mean of log(1 + |r|^2 / s^2) at the scale that was given, for comparisons
+  std::size_t groups = 0;
+  double sigma(int i) const;
+};
+
+using ResidualFunction = std::function<void(const Eigen::VectorXd&, Residuals&)>;
+
+/// `prior_sigma`: of each parameter about its value at the start (infinite: none). `step`: for derivatives.
+Fit robust_fit(const ResidualFunction& residuals, const Eigen::VectorXd& start, const Eigen::VectorXd& prior_sigma,
+               const Eigen::VectorXd& step, int iterations = 12);
+
+/// Robust standard deviation of a row: of the median of the groups' lengths.
+double scale_of(const Residuals& r);
+
+/// Mean over groups of log(1 + |r|^2 / (width s^2)).
+double cost_of(const Residuals& r, double scale);
+
+}  // namespace kilvo::lab

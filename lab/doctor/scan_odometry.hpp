@@ -1,0 +1,37 @@
+// The LiDAR's motion by its sweeps alone: each is registered to the planes of those before. Without a gyro the sweeps are taken as rigid,
+// so that neither mounts nor point times can spoil it; with one, the motion within a sweep is removed.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "kilvo/math/se3.hpp"
+#include "lab/doctor/gyro_path.hpp"
+
+namespace kilvo::lab {
+
+struct SweepPose {
+  double t = 0;  // s, middle of the sweep on the LiDAR's clock
+  double begin = 0, end = 0;
+  SE3 T_WL;                                       // LiDAR in its first frame
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();  // m/s
+  double thickness = 0;                           // m, robust distance of the points from the planes
+  double weakest = 0;  // least information about a direction of translation, of 1 when all normals point alike in all directions
+  bool good = false;
+};
+
+/// What is known of the turning within a sweep.
+struct Deskew {
+  const GyroPath* gyro = nullptr;
+  SO3 R_IL;
+  double offset = 0;      // s: the LiDAR's stamps plus this are on the IMU's clock
+  bool reversed = false;  // hypothesis: the points' times run backwards within a sweep
+};
+
+struct OdometryRange {
+  std::size_t begin = 0, end = SIZE_MAX;  // sweeps
+};
+
+std::vector<SweepPose> scan_odometry(const std::vector<Sweep>& sweeps, const Deskew& deskew, OdometryRange range = {});
+
+}  // namespace kilvo::lab

@@ -1,0 +1,176 @@
+#include "lab/doctor/translation_fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "lab/doctor/turns.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+using Matrix39 = Eigen::Matrix<double, 3, 9>;
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
+using Vector9 = Eigen::Matrix<double, 9, 1>;
+
+constexpr double bias_prior = 0.15;   // m/s^2
+constexpr double position_prior = 1;  // m
+constexpr double weak = 0.02;         // share of the sweep's information; below it the LiDAR does not know its way
+constexpr std::size_t fewest = 40;    // rows
+
+// Velocity and place that a constant force in the IMU frame (one column for each element of the axes) gives from a to b, in the frame of
+// the IMU at a. Each sample holds until the middle between its neighbours.
+struct Integral {
+  Matrix39 v = Matrix39::Zero(), p = Matrix39::Zero();
+  Eigen::Matrix3d v_bias = Eigen::Matrix3d::Zero(), p_bias = Eigen::Matrix3d::Zero();
+};
+
+Integral integrate(const std::vector<InertialSample>& imu, const GyroPath& gyro, double a, double b) {
+  Integral out;
+  auto it = std::ranges::lower_bound(imu, a, {}, &InertialSample::t);
+  if (it != imu.begin()) --it;
+  const Eigen::Quaterniond R_a = gyro.at(a).conjugate();
+  for (; it != imu.end() && it->t < b; ++it) {
+    const auto next = std::next(it);
+    if (next == imu.end()) break;
+    const double from = std::max(a, it->t), to = std::min(b, next->t), dt = to - from;
+    if (!(dt > 0)) continue;
+    const Eigen::Matrix3d R = (R_a * gyro.at(0.5 * (from + to))).toRotationMatrix();
+    const double share = (0.5 * (from + to) - it->t) / (next->t - it->t);
+    const Eigen::Vector3d f = (1 - share) * it->accel + share * next->accel;
+    Matrix39 F;
+    for (int i = 0; i < 3; ++i) F.block<3, 3>(0, 3 * i) = R.col(i) * f.transpose();
+    out.p += dt * out.v + 0.5 * dt * dt * F;
+    out.p_bias += dt * out.v_bias - 0.5 * dt * dt * R;
+    out.v += dt * F;
+    out.v_bias -= dt * R;
+  }
+  return out;
+}
+
+// What the mean place during a sweep differs from that in its middle by, but for gravity; by element of the axes.
+Matrix39 mean_shift(const std::vector<InertialSample>& imu, const GyroPath& gyro, const SweepPose& pose, double offset, const SO3& R_IL) {
+  const double a = pose.begin + offset, b = pose.end + offset, span = b - a;
+  if (!(span > 0.01) || !gyro.covers(a, b)) return Matrix39::Zero();
+  const Eigen::Matrix3d R_WI = (pose.T_WL.R * R_IL.inverse()).matrix() * gyro.between(pose.t + offset, a).toRotationMatrix();
+  return span / 24 * R_WI * integrate(imu, gyro, a, b).v;
+}
+
+}  // namespace
+
+double TranslationFit::sigma_r(int i) const { return std::sqrt(std::max(0.0, cov(i, i))); }
+
+TranslationRows::TranslationRows(const std::vector<SweepPose>& poses, const std::vector<InertialSample>& imu, const GyroPath& gyro,
+                                 const SO3& R_IL, double offset) {
+  const auto usable = [&](const SweepPose& p) { return p.good && p.weakest > weak; };
+  for (std::size_t k = 1; k + 1 < poses.size(); ++k) {
+    const SweepPose &a = poses[k - 1], &b = poses[k], &c = poses[k + 1];
+    if (!usable(a) || !usable(b) || !usable(c)) continue;
+    const double before = b.t - a.t, after = c.t - b.t;
+    if (!(before > 0.02 && after > 0.02 && before < 0.35 && after < 0.35)) continue;
+    if (!gyro.covers(a.t + offset, c.t + offset)) continue;
+    const SO3 R_a = a.T_WL.R * R_IL.inverse(), R_b = b.T_WL.R * R_IL.inverse(), R_c = c.T_WL.R * R_IL.inverse();
+    const Integral I = integrate(imu, gyro, a.t + offset, b.t + offset), J = integrate(imu, gyro, b.t + offset, c.t + offset);
+    Row row;
+    row.t = b.t;
+    row.dt = 0.5 * (before + after);
+    row.y = (c.T_WL.p - b.T_WL.p) / after - (b.T_WL.p - a.T_WL.p) / before;
+    row.H_r = (R_c.matrix() - R_b.matrix()) / after - (R_b.matrix() - R_a.matrix()) / before;
+    row.H_ba = R_a.matrix() * (I.v_bias - I.p_bias / before) + R_b.matrix() * J.p_bias / after;
+    row.force = R_a.matrix() * (I.v - I.p / before) + R_b.matrix() * J.p / after;
+    // A sweep gives the mean of the way during it, which is off its middle by a T^2 / 24.
+    const Matrix39 A = mean_shift(imu, gyro, a, offset, R_IL), B = mean_shift(imu, gyro, b, offset, R_IL),
+                   C = mean_shift(imu, gyro, c, offset, R_IL);
+    row.force += (C - B) / after - (B - A) / before;
+    rows_.push_back(row);
+  }
+}
+
+std::optional<TranslationFit> TranslationRows::fit(const Eigen::Matrix3d& axes) const {
+  if (rows_.size() < fewest) return std::nullopt;
+  Vector9 elements;
+  for (int i = 0; i < 3; ++i) elements.segment<3>(3 * i) = axes.row(i).transpose();
+  TranslationFit out;
+  out.rows = rows_.size();
+  Vector9 x = Vector9::Zero();
+  double scale = 0.3;
+  Vector9 prior = Vector9::Zero();
+  prior.head<3>().setConstant(1 / (position_prior * position_prior));
+  prior.tail<3>().setConstant(1 / (bias_prior * bias_prior));
+  for (int k = 0; k < 8; ++k) {
+    Matrix9 H = scale * scale * Matrix9(prior.asDiagonal()), meat = scale * scale * H;
+    Vector9 g = Vector9::Zero(), block = Vector9::Zero();
+    std::vector<double> lengths;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const Row& row = rows_[i];
+      Matrix39 J;
+      J << row.H_r, row.dt * Eigen::Matrix3d::Identity(), row.H_ba;
+      const Eigen::Vector3d y = row.y - row.force * elements, e = y - J * x;
+      const double square = e.squaredNorm() / 3;
+      lengths.push_back(e.squaredNorm());
+      const double weight = 1 / (1 + square / (4 * scale * scale));
+      H += weight * J.transpose() * J;
+      g += weight * J.transpose() * y;
+      block += weight * J.transpose() * e;
+      if (i + 1 == rows_.size() || static_cast<int>(rows_[i + 1].t / block_seconds) != static_cast<int>(row.t / block_seconds)) {
+        meat += block * block.transpose();
+        block.setZero();
+      }
+    }
+    const Matrix9 inverse = H.ldlt().solve(Matrix9::Identity());
+    out.cov = inverse * meat * inverse;
+    x = inverse * g;
+    const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+    std::ranges::nth_element(lengths, middle);
+    scale = std::sqrt(*middle / 2.366) + 1e-6;
+  }
+  if (!x.allFinite()) return std::nullopt;
+  out.r = x.head<3>();
+  out.g_W = x.segment<3>(3);
+  out.ba = x.tail<3>();
+  out.rms = scale;
+  return out;
+}
+
+std::vector<Eigen::Matrix3d> signed_permutations() {
+  constexpr int orders[6][3] = {{0, 1, 2}, {1, 0, 2}, {0, 2, 1}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1}};
+  std::vector<Eigen::Matrix3d> out;
+  for (const auto& order : orders) {
+    for (int signs = 0; signs < 8; ++signs) {
+      Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
+      for (int i = 0; i < 3; ++i) m(i, order[i]) = (signs >> i & 1) != 0 ? -1 : 1;
+      out.push_back(m);
+    }
+  }
+  return out;
+}
+
+Eigen::Matrix3d nearest_permutation(const Eigen::Matrix3d& m) {
+  Eigen::Matrix3d best = Eigen::Matrix3d::Identity();
+  double most = -1e9;
+  for (const Eigen::Matrix3d& p : signed_permutations()) {
+    const double likeness = p.cwiseProduct(m).sum();
+    if (likeness > most + 1e-9) {
+      most = likeness;
+      best = p;
+    }
+  }
+  return best;
+}
+
+std::string axes_text(const Eigen::Matrix3d& permutation) {
+  std::string out;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      if (permutation(i, j) == 0) continue;
+      out += (out.empty() ? "" : " ");
+      out += permutation(i, j) > 0 ? '+' : '-';
+      out += "xyz"[j];
+    }
+  }
+  return out;
+}
+
+}  // namespace kilvo::lab

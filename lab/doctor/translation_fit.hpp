@@ -1,0 +1,49 @@
+// Where the LiDAR sits on the IMU, and whether the accelerometer's axes are what they seem, from the LiDAR's way and the specific force.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "lab/doctor/robust_fit.hpp"
+#include "lab/doctor/scan_odometry.hpp"
+
+namespace kilvo::lab {
+
+struct TranslationFit {
+  Eigen::Vector3d r = Eigen::Vector3d::Zero();                            // LiDAR in the IMU frame, m
+  Eigen::Vector3d g_W = Eigen::Vector3d::Zero();                          // gravity in the frame of the LiDAR's way, m/s^2
+  Eigen::Vector3d ba = Eigen::Vector3d::Zero();                           // m/s^2
+  Eigen::Matrix<double, 9, 9> cov = Eigen::Matrix<double, 9, 9>::Zero();  // of the three
+  double rms = 0;                                                         // m/s, robust, of a row
+  std::size_t rows = 0;
+  double sigma_r(int i) const;
+};
+
+/// The rows of p_{k+1} - 2 p_k + p_{k-1} against the doubly integrated specific force, for any axes of the accelerometer.
+class TranslationRows {
+ public:
+  /// `offset`: the LiDAR's stamps plus this are on the IMU's clock.
+  TranslationRows(const std::vector<SweepPose>& poses, const std::vector<InertialSample>& imu, const GyroPath& gyro, const SO3& R_IL,
+                  double offset);
+  std::size_t size() const { return rows_.size(); }
+  /// `axes`: takes what the accelerometer wrote to m/s^2 in the IMU frame. None with too few rows.
+  std::optional<TranslationFit> fit(const Eigen::Matrix3d& axes) const;
+
+ private:
+  struct Row {
+    double t, dt;
+    Eigen::Matrix3d H_r, H_ba;
+    Eigen::Vector3d y;
+    Eigen::Matrix<double, 3, 9> force;  // of each element of the axes, row by row
+  };
+  std::vector<Row> rows_;
+};
+
+/// The 48 signed permutations: the identity first, then by how many signs and places differ.
+std::vector<Eigen::Matrix3d> signed_permutations();
+/// The nearest of them.
+Eigen::Matrix3d nearest_permutation(const Eigen::Matrix3d& m);
+/// "+x -y +z": which axis of the first frame each axis of the second is.
+std::string axes_text(const Eigen::Matrix3d& permutation);
+
+}  // namespace kilvo::lab
