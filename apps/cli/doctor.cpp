@@ -1,4 +1,4 @@
-// kilvo doctor INPUT --config FILE
+// kilvo doctor INPUT --config FILE, kilvo calibrate INPUT --config FILE --out FILE
 #include <filesystem>
 #include <fmt/core.h>
 #include <fstream>
@@ -84,18 +84,65 @@ void write_corrected(const fs::path& from, const fs::path& to, const lab::Settin
   fmt::print(stderr, "kilvo: {} with {} setting{} changed\n", to.string(), changes, changes == 1 ? "" : "s");
 }
 
-int doctor(const DoctorOptions& options) {
+struct Judged {
+  fs::path config;
+  lab::Settings settings;
+  lab::Diagnosis diagnosis;
+  std::vector<lab::Refinement> refinements;
+};
+
+Judged judge(const DoctorOptions& options) {
   const auto config = config_file(options.config.empty() ? std::nullopt : std::optional(options.config), options.input);
   const lab::Settings settings = lab::load_settings(config, options.overrides);
   const SensorChoice choice = choose_sensors(std::nullopt, settings, config.string(), options.input);
   for (const std::string& text : choice.warnings) fmt::print(stderr, "kilvo: warning: {}\n", text);
   const lab::Recorded recorded = record(options, recording_options(options, settings, choice.used));
   lab::Examination examination(recorded, settings.robot);
-  const lab::Diagnosis diagnosis = examination.run();
+  lab::Diagnosis diagnosis = examination.run();
+  return {config, settings, std::move(diagnosis), examination.refinements()};
+}
+
+int doctor(const DoctorOptions& options) {
+  const Judged judged = judge(options);
+  const lab::Diagnosis& diagnosis = judged.diagnosis;
   fmt::print("{}", options.json ? lab::to_json(diagnosis) : lab::to_text(diagnosis));
-  if (!options.write.empty()) write_corrected(config, options.write, settings, diagnosis);
+  if (!options.write.empty()) write_corrected(judged.config, options.write, judged.settings, diagnosis);
   if (!diagnosis.good()) return run_failed;
   return diagnosis.unknown() ? unusable_input : done;
+}
+
+/// Small errors can be measured only where there are no large ones.
+int calibrate(const DoctorOptions& options) {
+  const Judged judged = judge(options);
+  if (!judged.diagnosis.good()) {
+    fmt::print("{}", options.json ? lab::to_json(judged.diagnosis) : lab::to_text(judged.diagnosis));
+    fmt::print(stderr, "kilvo: calibrate: the description is wrong; mend it first (kilvo doctor --write FILE)\n");
+    return run_failed;
+  }
+  fmt::print("{}", options.json ? lab::to_json(judged.refinements) : lab::to_text(judged.refinements));
+  lab::Diagnosis changes;
+  for (const lab::Refinement& r : judged.refinements) {
+    if (!r.significant) continue;
+    lab::Finding f;
+    f.sensor = r.sensor;
+    f.changes = r.changes;
+    changes.findings.push_back(std::move(f));
+  }
+  write_corrected(judged.config, options.write, judged.settings, changes);
+  return judged.refinements.empty() ? unusable_input : done;
+}
+
+void add_common(CLI::App& verb, DoctorOptions& options) {
+  verb.add_option("INPUT", options.input, "a recording, or a folder with one in it")->required();
+  verb.add_option("--config", options.config,
+                  "the description; default: config.yaml in INPUT if that is a folder, else the shipped robots/g1.yaml")
+      ->type_name("FILE");
+  verb.add_option("--set", options.overrides, "override one setting, repeatable (lidar.time_offset=0.005)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  verb.add_option("--start", options.start, "begin this many seconds into the recording")->type_name("S");
+  verb.add_option("--duration", options.duration, "look at so many seconds; default: 60")->type_name("S");
+  verb.add_flag("--json", options.json, "print JSON");
 }
 
 }  // namespace
@@ -103,18 +150,17 @@ int doctor(const DoctorOptions& options) {
 void add_doctor(CLI::App& program, Action& chosen) {
   auto options = std::make_shared<DoctorOptions>();
   CLI::App* verb = program.add_subcommand("doctor", "judge the description of a robot by a recording");
-  verb->add_option("INPUT", options->input, "ROS 1 bag, or a folder with recording.bag in it")->required();
-  verb->add_option("--config", options->config,
-                   "the description; default: config.yaml in INPUT if that is a folder, else the shipped robots/g1.yaml")
-      ->type_name("FILE");
+  add_common(*verb, *options);
   verb->add_option("--write", options->write, "write the configuration there with what was found put right")->type_name("FILE");
-  verb->add_option("--set", options->overrides, "override one setting, repeatable (lidar.time_offset=0.005)")
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false);
-  verb->add_option("--start", options->start, "begin this many seconds into the recording")->type_name("S");
-  verb->add_option("--duration", options->duration, "look at so many seconds; default: 60")->type_name("S");
-  verb->add_flag("--json", options->json, "print one JSON object");
   verb->callback([options, &chosen] { chosen = [options] { return doctor(*options); }; });
+}
+
+void add_calibrate(CLI::App& program, Action& chosen) {
+  auto options = std::make_shared<DoctorOptions>();
+  CLI::App* verb = program.add_subcommand("calibrate", "measure mounts, focal length and clocks from a recording");
+  add_common(*verb, *options);
+  verb->add_option("--out", options->write, "the configuration with what was significantly off put right")->type_name("FILE")->required();
+  verb->callback([options, &chosen] { chosen = [options] { return calibrate(*options); }; });
 }
 
 }  // namespace kilvo::cli

@@ -35,6 +35,7 @@ int parse_and_do(const std::vector<std::string>& words) {
   add_live(program, chosen);
   add_info(program, chosen);
   add_doctor(program, chosen);
+  add_calibrate(program, chosen);
   add_eval(program, chosen);
   add_compare(program, chosen);
   add_eval_contacts(program, chosen);

@@ -15,6 +15,7 @@ using Action = std::function<int()>;
 
 void add_run(CLI::App& program, Action& chosen);
 void add_doctor(CLI::App& program, Action& chosen);
+void add_calibrate(CLI::App& program, Action& chosen);
 void add_info(CLI::App& program, Action& chosen);
 void add_eval(CLI::App& program, Action& chosen);
 void add_compare(CLI::App& program, Action& chosen);

@@ -80,6 +80,26 @@ void Examination::find_rotation(Finding f, const SO3& before, const SO3& after, 
   find(std::move(f));
 }
 
+// `sigma`: rad, in the sensor's frame, in which the change is given as well; `method`: degrees that the method itself may be off by.
+void Examination::refine_rotation(Sensor sensor, const std::string& what, const SO3& described, const SO3& measured,
+                                  const Eigen::Vector3d& sigma, double method, const std::string& key) {
+  constexpr double largest = 0.3;  // degrees
+  const Eigen::Vector3d turn = (described.inverse() * measured).Log();
+  Refinement r = refinement(sensor, what, {degrees(turn.x()), degrees(turn.y()), degrees(turn.z())},
+                            {degrees(sigma.x()), degrees(sigma.y()), degrees(sigma.z())}, method, largest, "deg");
+  r.changes = {{key, rotation_text(measured)}};
+  refinements_.push_back(std::move(r));
+}
+
+void Examination::refine_offset(Sensor sensor, double offset, double sigma, double method) {
+  constexpr double largest = 0.002;  // s
+  const double offsets[] = {original_.imu.time_offset, original_.legs.time_offset, original_.lidar.time_offset,
+                            original_.camera.time_offset};
+  Refinement r = refinement(sensor, fmt::format("clock of the {}", name_of(sensor)), {offset}, {sigma}, method, largest, fmt::format("s"));
+  r.changes = {{fmt::format("{}.time_offset", name_of(sensor)), fmt::format("{:.5f}", offsets[static_cast<std::size_t>(sensor)] + offset)}};
+  refinements_.push_back(std::move(r));
+}
+
 std::vector<InertialSample> Examination::mended_imu() const {
   std::vector<InertialSample> out = recorded_.imu;
   for (InertialSample& s : out) {

@@ -9,6 +9,7 @@
 #include "lab/doctor/finding.hpp"
 #include "lab/doctor/leg_path.hpp"
 #include "lab/doctor/recorded.hpp"
+#include "lab/doctor/refinement.hpp"
 #include "lab/doctor/scan_odometry.hpp"
 #include "lab/doctor/translation_fit.hpp"
 #include "lab/doctor/turns.hpp"
@@ -25,7 +26,7 @@ struct SenseAgreement {
   double offset = 0;                                    // s
   double explained = 0;                                 // under the best mount
   double as_described = 0;                              // under the configured one
-  double turning = 0;  // rad/s, rms
+  double turning = 0;                                   // rad/s, rms
   double weakest = 0;                                   // rad/s, rms of the turning about the least turned axis
 };
 
@@ -38,6 +39,8 @@ class Examination {
 
   /// After run(): the description as the data have it, for refinement.
   const Robot& robot() const { return robot_; }
+  /// After run(): what the recording says about mounts, focal length and clocks, with its standard deviations.
+  const std::vector<Refinement>& refinements() const { return refinements_; }
 
  private:
   // imu_examination.cpp
@@ -86,6 +89,9 @@ class Examination {
   void check(Sensor sensor, const std::string& what, Check::Verdict verdict, const std::string& detail);
   void find(Finding finding);
   void find_offset(Sensor sensor, double offset, double sigma, const std::string& evidence);
+  void refine_rotation(Sensor sensor, const std::string& what, const SO3& described, const SO3& measured, const Eigen::Vector3d& sigma,
+                       double method, const std::string& key);
+  void refine_offset(Sensor sensor, double offset, double sigma, double method);
   void find_rotation(Finding finding, const SO3& before, const SO3& after, const std::string& key);
 
   const Recorded& recorded_;
@@ -99,6 +105,7 @@ class Examination {
   double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock
   std::optional<TranslationFit> translation_;
   Diagnosis diagnosis_;
+  std::vector<Refinement> refinements_;
 };
 
 std::string rotation_text(const SO3& R);  // as YAML, row by row

@@ -225,6 +225,12 @@ void Examination::examine_leg_rotation() {
     return;
   }
   leg_offset_ = fit.offset;
+  // What soles that roll and links that bend shift both by shows in what is not explained.
+  const double unexplained = std::max(0.0, 1 - explained);
+  refine_rotation(Sensor::imu, "rotation of the IMU on the robot", described, fit.R, fit.rotation_sigma(), 0.05 + 10 * unexplained,
+                  "imu.T_link_imu.R");
+  refinements_.back().changes = {{"imu.T_link_imu.R", rotation_text(fit.R.inverse())}};
+  refine_offset(Sensor::legs, fit.offset, fit.offset_sigma(), 0.0004 + 0.04 * unexplained);
   const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
   const double angle = degrees(turn.norm()), uncertain = degrees(fit.rotation_sigma().norm());
   const std::string detail = fmt::format("{:.1f} degrees from the description, standard deviation {:.1f}; {:.0f} % explained", angle,

@@ -134,9 +134,11 @@ void Examination::examine_lidar_rotation() {
   lidar_.offset = fit.offset;
   lidar_.error = (fit.R * described.inverse()).matrix();
   lidar_offset_ = fit.offset;
+  constexpr double method = 0.02;  // degrees
+  refine_rotation(Sensor::lidar, "rotation of the LiDAR on the IMU", described, fit.R, fit.rotation_sigma(), method, "lidar.T_imu_lidar.R");
   const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
   const double angle = degrees(turn.norm());
-  const Eigen::Vector3d sigma = fit.R * fit.rotation_sigma();
+  const Eigen::Vector3d sigma = fit.rotation_sigma();
   const double uncertain = degrees(sigma.norm());
   const std::string detail = fmt::format("{:.2f} degrees from the description, standard deviation {:.2f}", angle, uncertain);
   if (angle < std::max(rotation_tolerance, sure * uncertain)) {
@@ -175,6 +177,8 @@ void Examination::examine_lidar_clock() {
       fit_mount(turns_of(way_), gyro(), SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix()), lidar_.offset);
   if (!fit.fit.good) return;
   const double sigma = fit.offset_sigma();
+  constexpr double method = 0.0001;  // s
+  refine_offset(Sensor::lidar, fit.offset, sigma, method);
   lidar_offset_ = fit.offset;
   const std::string detail = fmt::format("{:.2f} ms against the IMU, standard deviation {:.2f} ms", 1e3 * fit.offset, 1e3 * sigma);
   if (std::abs(fit.offset) < std::max(clock_tolerance, sure * sigma)) {
@@ -197,6 +201,11 @@ void Examination::examine_lidar_position() {
   const TranslationFit& fit = *translation_;
   const Eigen::Vector3d described = robot_.lidar.T_imu_lidar.p, error = fit.r - described;
   const Eigen::Vector3d sigma(fit.sigma_r(0), fit.sigma_r(1), fit.sigma_r(2));
+  constexpr double method = 0.004, largest = 0.02;  // m
+  Refinement r = refinement(Sensor::lidar, "position of the LiDAR on the IMU", {error.x(), error.y(), error.z()},
+                            {sigma.x(), sigma.y(), sigma.z()}, method, largest, fmt::format("m"));
+  r.changes = {{"lidar.T_imu_lidar.p", vector_text(fit.r)}};
+  refinements_.push_back(std::move(r));
   bool wrong = false;
   for (int i = 0; i < 3; ++i) wrong |= std::abs(error[i]) > std::max(position_tolerance, sure * sigma[i]);
   const std::string detail =
