@@ -271,8 +271,7 @@ void Examination::settle_imu_link(const SO3& measured) {
   }
   const GyroPath path = gyro();
   std::string link;
-  double best = legs_.explained - 0.05;
-  double nearest = 0.5 * angle;
+  double best = legs_.explained - 0.05, nearest = 0.5 * angle;
   for (const std::string& name : link_names(robot_.urdf)) {
     if (name == robot_.imu.link) continue;
     LegHypothesis h;

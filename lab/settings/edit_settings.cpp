@@ -50,6 +50,16 @@ std::string with_setting(const std::string& yaml, const std::string& key, const 
       if (!node.IsMap() || node.size() == 0) throw ConfigError(fmt::format("{}: its section is not in the configuration file", key));
       in_flow = in_flow || node.Style() == YAML::EmitterStyle::Flow;
       const YAML::Node next = static_cast<const YAML::Node&>(node)[name];
+      if (!next.IsDefined() && name == "R") {
+        // The same rotation may be there as a quaternion or as angles.
+        for (const auto& pair : node) {
+          const std::string other = pair.first.Scalar();
+          if (other != "q" && other != "rpy") continue;
+          const std::size_t at = position_of(pair.first);
+          std::string out = yaml;
+          return out.replace(at, end_of_value(yaml, position_of(pair.second), in_flow) - at, fmt::format("R: {}", value));
+        }
+      }
       if (!next.IsDefined()) {
         if (end != key.size()) throw ConfigError(fmt::format("{}: its section is not in the configuration file", key));
         return with_new_key(yaml, node, name, value);

@@ -25,5 +25,10 @@ TEST(EditSettings, AMissingKeyJoinsItsSection) {
   EXPECT_THROW(with_setting(text, "camera.time_offset", "0.005"), ConfigError);
 }
 
+TEST(EditSettings, ARotationReplacesItsOtherSpellings) {
+  EXPECT_EQ(with_setting("lidar:\n  T_imu_lidar:\n    p: [0, 0, 0]\n    rpy: [3, 0, 0]\n", "lidar.T_imu_lidar.R", "[1]"),
+            "lidar:\n  T_imu_lidar:\n    p: [0, 0, 0]\n    R: [1]\n");
+}
+
 }  // namespace
 }  // namespace kilvo::lab
