@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "apps/cli/exit_code.hpp"
+#include "apps/cli/held_output.hpp"
 #include "apps/cli/interrupt.hpp"
 #include "apps/cli/make_estimator.hpp"
 #include "apps/cli/map_keeper.hpp"
@@ -85,7 +86,7 @@ class Run {
     facts_.failure = failure(interrupted);
     for (const Sensor sensor : facts_.sensors) facts_.withheld[static_cast<std::size_t>(sensor)] = failing_.dropped(sensor);
     const lab::MapBuilder& map = map_.finish();
-    if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map);
+    if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map, levelling_.turn().value_or(SO3()));
     facts_.map_points = map.size();
     facts_.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - facts_.begin).count();
     write_text_file(options_.out / "summary.json", summary_json(facts_, settings_, source_, estimator_.statistics(), files_.run_summary()));
@@ -157,17 +158,18 @@ class Run {
     for (Output& output : outputs) {
       if (output.epoch > 0) continue;  // of another recording: failure() says so
       if (settings_.estimator.gravity_align) levelling_.add(output);
-      waiting_.push_back(std::move(output));
+      keep_map(output);
+      waiting_.emplace_back(std::move(output));
     }
     if (!settings_.estimator.gravity_align || levelling_.turn()) write_waiting();
   }
 
   // In the world as it is known to lie by then: nothing is written before.
   void write_waiting() {
-    for (Output& output : waiting_) {
+    for (const HeldOutput& held : waiting_) {
+      Output output = held.output();
       if (levelling_.turn()) Levelling::apply(*levelling_.turn(), output);
       files_.write(output);
-      keep_map(output);
     }
     waiting_.clear();
   }
@@ -227,7 +229,7 @@ class Run {
   ResultFiles files_;
   SkeletonFile skeleton_;
   Levelling levelling_;
-  std::vector<Output> waiting_;  // until the world is level
+  std::vector<HeldOutput> waiting_;  // until the world is level
   Progress progress_;
   bool legs_seen_ = false;
   int foreign_legs_ = 0;

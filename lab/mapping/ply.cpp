@@ -54,8 +54,23 @@ class Greys {
 
 using Vertex = std::array<char, sizeof(Eigen::Vector4f) + 3>;
 
-Vertex coloured_vertex(const MapBuilder& map, std::size_t i, const Greys& greys) {
-  const Eigen::Vector4f point = map.point(i);
+/// Where the points lie in the world that is written.
+class Turned {
+ public:
+  Turned(const MapBuilder& map, const SO3& turn) : map_(map), R_(turn.matrix().cast<float>()) {}
+  Eigen::Vector4f operator()(std::size_t i) const {
+    Eigen::Vector4f point = map_.point(i);
+    point.head<3>() = (R_ * point.head<3>()).eval();
+    return point;
+  }
+
+ private:
+  const MapBuilder& map_;
+  Eigen::Matrix3f R_;
+};
+
+Vertex coloured_vertex(const MapBuilder& map, const Turned& turned, std::size_t i, const Greys& greys) {
+  const Eigen::Vector4f point = turned(i);
   auto rgb = map.colour_of(i);
   if (!rgb) {
     const std::uint8_t grey = greys.of(point[3]);
@@ -81,16 +96,17 @@ bool write_vertices(std::FILE* file, std::size_t size, const Make& make) {
   return true;
 }
 
-bool write_points(std::FILE* file, const MapBuilder& map) {
-  if (map.coloured() == 0) return write_vertices(file, map.size(), [&](std::size_t i) { return map.point(i); });
-  return write_vertices(file, map.size(), [&, greys = Greys(map)](std::size_t i) { return coloured_vertex(map, i, greys); });
+bool write_points(std::FILE* file, const MapBuilder& map, const SO3& turn) {
+  const Turned turned(map, turn);
+  if (map.coloured() == 0) return write_vertices(file, map.size(), turned);
+  return write_vertices(file, map.size(), [&, greys = Greys(map)](std::size_t i) { return coloured_vertex(map, turned, i, greys); });
 }
 
-bool write_map(const fs::path& path, const MapBuilder& map) {
+bool write_map(const fs::path& path, const MapBuilder& map, const SO3& turn) {
   File file(std::fopen(path.c_str(), "wb"), std::fclose);
   if (!file) return false;
   const std::string head = header(map);
-  if (!write_all(file.get(), head.data(), head.size()) || !write_points(file.get(), map)) return false;
+  if (!write_all(file.get(), head.data(), head.size()) || !write_points(file.get(), map, turn)) return false;
   return std::fclose(file.release()) == 0;
 }
 
@@ -147,14 +163,14 @@ void append_vertex(const std::vector<char>& vertex, const Layout& layout, Cloud&
 
 }  // namespace
 
-void write_ply(const fs::path& path, const MapBuilder& map) {
+void write_ply(const fs::path& path, const MapBuilder& map, const SO3& turn) {
   std::error_code error;
   // A device or a pipe is written to, never replaced; a link is followed.
   const bool special = fs::exists(path, error) && !fs::is_regular_file(path, error);
   const fs::path target = fs::exists(path, error) ? fs::canonical(path, error) : path;
   const fs::path partial = special ? path : fs::path(target.string() + ".partial");
   errno = 0;
-  bool done = write_map(partial, map);
+  bool done = write_map(partial, map, turn);
   if (done && !special) done = std::rename(partial.c_str(), target.c_str()) == 0;
   if (done) return;
   const std::string reason = std::strerror(errno);

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "kilvo/math/so3.hpp"
 #include "lab/mapping/map_builder.hpp"
 #include "lab/mapping/output_error.hpp"
 
@@ -15,8 +16,8 @@ namespace kilvo::lab {
 
 /// Writes the whole map, in its order: the same map gives the same bytes. A map of which any point has a colour has red, green and blue;
 /// points that no image saw are then grey by their intensity, so that what one looks at is whole. A file that was there stays whole until
-/// the new one is complete (written beside it as PATH.partial, then renamed). Throws OutputError.
-void write_ply(const std::filesystem::path& path, const MapBuilder& map);
+/// the new one is complete (written beside it as PATH.partial, then renamed). `turn`: the points are turned by it. Throws OutputError.
+void write_ply(const std::filesystem::path& path, const MapBuilder& map, const SO3& turn = SO3());
 
 /// A file that is not a PLY as written here; the message names the path.
 class PlyError : public std::runtime_error {

@@ -190,5 +190,18 @@ TEST_F(Ply, RefusesAFileThatIsNoneOrEndsEarly) {
   EXPECT_THROW(read_ply(folder / "none.ply"), PlyError);
 }
 
+TEST_F(Ply, ATurnedMapIsTheSameMapTurned) {
+  const SO3 turn = SO3::Exp(Eigen::Vector3d(0, 0, M_PI / 2));
+  write_ply(folder / "as_is.ply", some_map());
+  write_ply(folder / "turned.ply", some_map(), turn);
+  const auto before = read_ply(folder / "as_is.ply"), after = read_ply(folder / "turned.ply");
+  ASSERT_EQ(before.size(), after.size());
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_NEAR(after[i].x(), -before[i].y(), 1e-4);
+    EXPECT_NEAR(after[i].y(), before[i].x(), 1e-4);
+    EXPECT_EQ(after[i][3], before[i][3]);
+  }
+}
+
 }  // namespace
 }  // namespace kilvo::lab
