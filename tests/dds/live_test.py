@@ -117,7 +117,7 @@ class LiveTest(unittest.TestCase):
         for disturber in disturbers:
             disturber.end()
         self.assertEqual(live.end(), 0, live.said())
-        self.assertIn("/lidar: a publisher sends sensor_msgs/LaserScan, but the sensor lidar needs sensor_msgs/PointCloud2", live.said())
+        self.assertIn("/points: a publisher sends sensor_msgs/LaserScan, but the sensor lidar needs sensor_msgs/PointCloud2", live.said())
         self.assertIn("/kilvo/odometry: a subscriber asks for another durability", live.said())
 
     def test_c_a_low_state_finds_its_time(self):

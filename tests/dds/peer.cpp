@@ -112,7 +112,7 @@ class Player {
     if (only.find("legs") != std::string::npos)
       legs_ = with_low_state_ ? peer_.writer("rt/lowstate", "unitree_hg::msg::dds_::LowState_", false)
                               : peer_.writer("rt/joint_states", "sensor_msgs::msg::dds_::JointState_", false);
-    if (only.find("lidar") != std::string::npos) lidar_ = peer_.writer("rt/lidar", "sensor_msgs::msg::dds_::PointCloud2_", true);
+    if (only.find("lidar") != std::string::npos) lidar_ = peer_.writer("rt/points", "sensor_msgs::msg::dds_::PointCloud2_", true);
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
   }
 
@@ -133,7 +133,7 @@ class Player {
     lab::RecordingOptions options;
     options[Sensor::imu] = {true, "/imu", 200, 0};
     options[Sensor::legs] = {true, "/joint_states", 1000, 0};
-    options[Sensor::lidar] = {true, "/lidar", 10, 0};
+    options[Sensor::lidar] = {true, "/points", 10, 0};
     options.start = std::stod(words.option("--start", "0"));
     options.duration = std::stod(words.option("--seconds", "1e9"));
     return options;
@@ -249,7 +249,7 @@ int disturb(const Words& words) {
   Ear ear;
   DataWriter* writer = nullptr;
   if (words.plain.at(0) == "garbage") writer = peer.writer("rt/imu", "sensor_msgs::msg::dds_::Imu_", false);
-  if (words.plain.at(0) == "wrong-type") writer = peer.writer("rt/lidar", "sensor_msgs::msg::dds_::LaserScan_", true);
+  if (words.plain.at(0) == "wrong-type") writer = peer.writer("rt/points", "sensor_msgs::msg::dds_::LaserScan_", true);
   if (words.plain.at(0) == "picky") peer.reader("rt/kilvo/odometry", "nav_msgs::msg::dds_::Odometry_", &ear, true);
   std::mt19937 random(1);
   const auto end = Wall::now() + std::chrono::duration_cast<Wall::duration>(std::chrono::duration<double>(seconds));
