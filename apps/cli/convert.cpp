@@ -118,7 +118,10 @@ void add_convert(CLI::App& program, Action& chosen) {
                    "in all others as ROS 2 (CDR)")
       ->required()
       ->expected(2, -1);
-  verb->add_option("--topics", words->topics, "only these")->type_name("TOPIC");
+  verb->add_option("--topics", words->topics, "only these, repeatable (/imu,/points)")
+      ->type_name("TOPIC,...")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   verb->add_option("--config", words->config, "only the topics of the sensors in this configuration")->type_name("FILE");
   verb->add_option("--start", words->start, "begin this many seconds into the recording")->type_name("S");
   verb->add_option("--duration", words->duration, "end after this many seconds")->type_name("S");

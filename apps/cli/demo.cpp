@@ -48,7 +48,7 @@ int demo(const DemoOptions& options) {
   const fs::path folder = options.out, results = folder / "results";
   simulate_into(folder, {"room", options.seed, options.duration, options.quiet});
   RunOptions run;
-  run.input = folder.string();
+  run.inputs = {folder.string()};
   run.out = results;
   run.config = (folder / "config.yaml").string();
   run.quiet = options.quiet;

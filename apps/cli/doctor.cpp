@@ -94,7 +94,7 @@ struct Judged {
 Judged judge(const DoctorOptions& options) {
   const auto config = config_file(options.config.empty() ? std::nullopt : std::optional(options.config), options.input);
   const lab::Settings settings = lab::load_settings(config, options.overrides);
-  const SensorChoice choice = choose_sensors(std::nullopt, settings, config.string(), options.input);
+  const SensorChoice choice = choose_sensors(std::nullopt, settings, config.string(), {options.input});
   for (const std::string& text : choice.warnings) fmt::print(stderr, "kilvo: warning: {}\n", text);
   const lab::Recorded recorded = record(options, recording_options(options, settings, choice.used));
   lab::Examination examination(recorded, settings.robot);

@@ -18,7 +18,10 @@ namespace kilvo::cli {
 namespace {
 
 struct InfoOptions {
-  std::string input, config;
+  std::vector<std::string> inputs;  // several are one recording
+  std::string config;
+
+  std::vector<std::filesystem::path> paths() const { return {inputs.begin(), inputs.end()}; }
 };
 
 std::string names_of(const std::vector<Sensor>& sensors) {
@@ -54,7 +57,7 @@ void print_joints(const InfoOptions& options, const lab::Settings& settings, con
   for (const Sensor sensor : every_sensor) only_legs[sensor].use = sensor == Sensor::legs;
   std::optional<JointSample> first;
   try {
-    lab::RecordingSource source(options.input, only_legs);
+    lab::RecordingSource source(options.paths(), only_legs);
     while (auto measurement = source.next()) {
       if (const auto* sample = std::get_if<JointSample>(&*measurement)) {
         first = *sample;
@@ -81,14 +84,14 @@ void print_joints(const InfoOptions& options, const lab::Settings& settings, con
 }
 
 int info(const InfoOptions& options) {
-  const auto config = config_file(options.config.empty() ? std::nullopt : std::optional(options.config), options.input);
+  const auto config = config_file(options.config.empty() ? std::nullopt : std::optional(options.config), options.inputs.front());
   const lab::Settings settings = lab::load_settings(config);
   lab::RecordingOptions wanted;
   for (const Sensor sensor : every_sensor) {
     wanted[sensor].use = settings.has(sensor);
     wanted[sensor].topic = settings.topic(sensor);
   }
-  const lab::RecordingDescription about = lab::describe_recording(options.input, wanted);
+  const lab::RecordingDescription about = lab::describe_recording(options.paths(), wanted);
   const std::string chunks = about.storage.chunks > 0 ? fmt::format(" in {} chunks", about.storage.chunks) : "";
   fmt::print("{}: {}, {:.1f} MB, {:.3f} s, {} messages{} ({})\n", about.file, about.storage.format, static_cast<double>(about.bytes) * 1e-6,
              to_seconds(about.end - about.begin), about.messages, chunks, about.storage.compression);
@@ -105,7 +108,11 @@ int info(const InfoOptions& options) {
 void add_info(CLI::App& program, Action& chosen) {
   auto options = std::make_shared<InfoOptions>();
   CLI::App* verb = program.add_subcommand("info", "what is in a recording, and what it would be used for");
-  verb->add_option("INPUT", options->input, "ROS 1 bag, or a folder with recording.bag in it")->required();
+  verb->add_option(
+          "INPUT", options->inputs,
+          "a ROS 1 bag, an MCAP file, a .db3 or folder of rosbag2, or a folder with recording.bag in it; several are one recording")
+      ->required()
+      ->expected(1, -1);
   verb->add_option("--config", options->config,
                    "configuration that says what topics are used for; default: config.yaml in INPUT if that is a folder, else the shipped "
                    "robots/g1.yaml")

@@ -27,7 +27,7 @@ void prepare_folder(const fs::path& folder) {
 
 void remove_results(const fs::path& folder) {
   std::error_code ignored;
-  for (const char* name : {"odometry.tum", "odometry_smooth.tum", "sweeps.tum", "states.csv", "contacts.csv", "degradation.csv",
+  for (const char* name : {"odometry.tum", "odometry_smooth.tum", "sweeps.tum", "states.csv", "contacts.csv", "degradation.csv", "run.mcap",
                            "modality.csv", "timing.csv", "events.csv", "skeleton.csv", "map.ply", "summary.json", "report.html"}) {
     if (fs::is_regular_file(folder / name, ignored)) fs::remove(folder / name, ignored);
   }

@@ -49,7 +49,11 @@ void add_run(CLI::App& program, Action& chosen) {
   auto words = std::make_shared<RunWords>();
   RunOptions& options = words->options;
   CLI::App* verb = program.add_subcommand("run", "estimate trajectory and map from a recording");
-  verb->add_option("INPUT", options.input, "ROS 1 bag, or a folder with recording.bag in it")->required();
+  verb->add_option(
+          "INPUT", options.inputs,
+          "a ROS 1 bag, an MCAP file, a .db3 or folder of rosbag2, or a folder with recording.bag in it; several are one recording")
+      ->required()
+      ->expected(1, -1);
   verb->add_option("--out", words->out, "folder for the results, created if need be")->type_name("DIR")->required();
   verb->add_option("--config", words->config,
                    "robot, sensors, topics and tuning; default: config.yaml in INPUT if that is a folder, else the shipped robots/g1.yaml")
@@ -72,6 +76,7 @@ void add_run(CLI::App& program, Action& chosen) {
   verb->add_option("--duration", options.duration, "end after this many seconds")->type_name("S");
   verb->add_option("--map", words->map, "write the map there instead of DIR/map.ply")->type_name("FILE.ply");
   verb->add_flag("--no-map", words->no_map, "write no map");
+  verb->add_flag("--mcap", options.mcap, "write DIR/run.mcap too: poses, transforms, contacts, clouds, times, events, for Foxglove");
   verb->add_flag("--no-deskew", options.no_deskew, "take each cloud at its stamp, as if its points had been measured at once");
   verb->add_option("--threads", words->threads, "default: all cores; results do not depend on it")
       ->type_name("N")

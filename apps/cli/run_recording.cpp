@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fmt/core.h>
+#include <memory>
 #include <utility>
 
 #include "apps/cli/exit_code.hpp"
@@ -23,9 +24,12 @@
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/estimator/levelling.hpp"
 #include "lab/mapping/ply.hpp"
+#include "lab/run_log/run_log.hpp"
 
 namespace kilvo::cli {
 namespace {
+
+std::vector<std::filesystem::path> paths_of(const std::vector<std::string>& words) { return {words.begin(), words.end()}; }
 
 double mount_rate(const Robot& robot, Sensor sensor) {
   const double rates[] = {robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate};
@@ -67,11 +71,14 @@ class Run {
         interrupt_(interrupt),
         settings_(std::move(settings)),
         facts_(std::move(facts)),
-        source_(options.input, recording_options(options, settings_, choice.used)),
+        source_(paths_of(options.inputs), recording_options(options, settings_, choice.used)),
         failing_(source_, options.failures, source_.begin(), [this] { return source_.recorded(); }),
         estimator_(make_estimator(settings_, choice.used)),
         map_(settings_.mapping, options.threads > 1 || options.realtime),
         files_(options.out, settings_.estimator.smooth_time),
+        log_(options.mcap ? std::make_unique<lab::RunLog>(options.out / "run.mcap",
+                                                          std::array{settings_.robot.feet[0].name, settings_.robot.feet[1].name})
+                          : nullptr),
         skeleton_(options.out / "skeleton.csv", settings_.robot),
         progress_(Progress::style_for(options.quiet)) {
     if (!options.quiet) tell_start(facts_, source_, options.no_deskew);
@@ -82,6 +89,7 @@ class Run {
     progress_.finish();
     files_.write_events(estimator_.take_events());
     files_.close();
+    if (log_) log_->close();
     skeleton_.close();
     facts_.failure = failure(interrupted);
     for (const Sensor sensor : facts_.sensors) facts_.withheld[static_cast<std::size_t>(sensor)] = failing_.dropped(sensor);
@@ -118,11 +126,14 @@ class Run {
   bool replay_live() {
     live::LiveRunner runner(estimator_, settings_.robot, settings_.estimator, as_flags(facts_.sensors), settings_.live,
                             {[this](Output output) {
-                               if (output.epoch == 0) files_.write_state(output);
+                               if (output.epoch > 0) return;
+                               files_.write_state(output);
+                               if (log_) log_->write_state(output);
                              },
                              [this](Output output) {
                                if (output.epoch > 0) return;
                                files_.write_sweep(output);
+                               if (log_) log_->write_sweep(output);
                                keep_map(output);
                              }});
     ReadAhead input(
@@ -170,6 +181,8 @@ class Run {
       Output output = held.output();
       if (levelling_.turn()) Levelling::apply(*levelling_.turn(), output);
       files_.write(output);
+      if (log_) log_->write_state(output);
+      if (log_) log_->write_sweep(output);
     }
     waiting_.clear();
   }
@@ -227,6 +240,7 @@ class Run {
   Estimator estimator_;
   MapKeeper map_;
   ResultFiles files_;
+  std::unique_ptr<lab::RunLog> log_;
   SkeletonFile skeleton_;
   Levelling levelling_;
   std::vector<HeldOutput> waiting_;  // until the world is level
@@ -239,18 +253,18 @@ class Run {
 
 int run_recording(const RunOptions& options) {
   RunFacts facts;
-  const std::filesystem::path config = config_file(options.config, options.input);
+  const std::filesystem::path config = config_file(options.config, options.inputs.front());
   lab::Settings settings = lab::load_settings(config, options.overrides);
   prepare_folder(options.out);
   remove_results(options.out);
   if (options.map) prepare_folder(std::filesystem::absolute(*options.map).parent_path());
-  SensorChoice choice = choose_sensors(options.sensors, settings, config.string(), options.input);
+  SensorChoice choice = choose_sensors(options.sensors, settings, config.string(), options.inputs);
   lab::require_complete(settings, choice.used);
   // On a robot the other cores are for others.
   if (options.realtime && !settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
   // Reading and the map keep about one core busy.
   if (!settings.given.contains("estimator.threads")) settings.estimator.threads = options.realtime ? 1 : std::max(1, options.threads - 1);
-  facts.input = options.input;
+  facts.input = joined(options.inputs);
   facts.config_file = config.string();
   facts.sensors = choice.used;
   facts.warnings = choice.warnings;

@@ -12,7 +12,7 @@
 namespace kilvo::cli {
 
 struct RunOptions {
-  std::string input;
+  std::vector<std::string> inputs;  // several are one recording
   std::filesystem::path out;
   std::optional<std::string> config;  // the shipped one of the G1 by default
   std::vector<std::string> overrides;
@@ -22,6 +22,7 @@ struct RunOptions {
   double duration = std::numeric_limits<double>::infinity();  // s
   std::optional<std::filesystem::path> map;                   // out/map.ply by default
   bool with_map = true;
+  bool mcap = false;  // out/run.mcap too
   std::optional<double> realtime;  // through the live runner, so many times as fast as it was recorded
   bool no_deskew = false;
   int threads = 1;  // more than one: reading and the map have their own. The results are the same

@@ -47,17 +47,15 @@ std::vector<Sensor> as_wanted(const std::vector<Sensor>& wanted, const lab::Sett
   return wanted;
 }
 
-std::set<std::string> topics_of(const std::string& input) {
+std::set<std::string> topics_of(const lab::RecordingReader& recording) {
   std::set<std::string> out;
-  const auto reader = lab::open_recording(input);
-  for (const auto& [id, connection] : reader->connections()) out.insert(connection.topic);
+  for (const auto& [id, connection] : recording.connections()) out.insert(connection.topic);
   return out;
 }
 
 // A topic of the sensor's kind that no setting names: then the setting is misspelt, and the sensor is not simply absent.
-std::optional<std::string> unnamed_topic(Sensor sensor, const lab::Settings& settings, const std::string& input) {
-  const auto reader = lab::open_recording(input);
-  for (const auto& [id, connection] : reader->connections()) {
+std::optional<std::string> unnamed_topic(Sensor sensor, const lab::Settings& settings, const lab::RecordingReader& recording) {
+  for (const auto& [id, connection] : recording.connections()) {
     if (!lab::is_type_of(sensor, connection.type)) continue;
     const bool named = std::ranges::any_of(every_sensor, [&](Sensor other) {
       return settings.has(other) && lab::topic_matches(other, settings.topic(other), connection.topic);
@@ -128,14 +126,22 @@ lab::Failure parse_drop(const std::string& text) {
   return out;
 }
 
+std::string joined(const std::vector<std::string>& inputs) {
+  std::string all;
+  for (const std::string& input : inputs) all += (all.empty() ? "" : " + ") + input;
+  return all;
+}
+
 SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, const lab::Settings& settings, const std::string& config,
-                            const std::string& input) {
+                            const std::vector<std::string>& inputs) {
   SensorChoice out;
   if (wanted) {
     out.used = as_wanted(*wanted, settings, config);
     return out;
   }
-  const std::set<std::string> topics = topics_of(input);
+  const std::string input = joined(inputs);
+  const auto recording = lab::open_recordings({inputs.begin(), inputs.end()});
+  const std::set<std::string> topics = topics_of(*recording);
   if (topics.empty()) throw lab::InputError(fmt::format("{}: holds no messages", input));
   // Images alone measure no motion: without these the estimator coasts.
   const auto measures_motion = [](Sensor sensor) { return sensor == Sensor::legs || sensor == Sensor::lidar; };
@@ -165,7 +171,7 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
     throw lab::InputError(fmt::format("{}: {}", input, missing.empty() ? "no IMU is configured" : missing.front()));
   }
   for (std::size_t i = 0; i < absent.size(); ++i) {
-    if (const auto topic = unnamed_topic(absent[i], settings, input)) {
+    if (const auto topic = unnamed_topic(absent[i], settings, *recording)) {
       throw lab::InputError(fmt::format("{}: {}; {} is of that kind: --set {}.topic={}, or leave the sensor out with --sensors {}", input,
                                         missing[i], *topic, name_of(absent[i]), *topic, names_of(out.used)));
     }

@@ -31,6 +31,9 @@ struct SensorChoice {
 /// The sensors wanted; without a wish those that are configured and in the input. Throws UsageError for a wish that cannot be fulfilled,
 /// InputError when the input has none of the topics configured, or neither legs nor LiDAR where any is configured.
 SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, const lab::Settings& settings, const std::string& config,
-                            const std::string& input);
+                            const std::vector<std::string>& inputs);
+
+/// How messages name several inputs.
+std::string joined(const std::vector<std::string>& inputs);
 
 }  // namespace kilvo::cli

@@ -133,6 +133,67 @@ float64 z
 float64 w
 )";
 
+constexpr std::string_view path = R"(Header header
+geometry_msgs/PoseStamped[] poses
+================================================================================
+MSG: geometry_msgs/PoseStamped
+Header header
+geometry_msgs/Pose pose
+================================================================================
+MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+================================================================================
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+)";
+
+constexpr std::string_view poses = R"(Header header
+geometry_msgs/Pose[] poses
+================================================================================
+MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+================================================================================
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+)";
+
+constexpr std::string_view diagnostics = R"(Header header
+diagnostic_msgs/DiagnosticStatus[] status
+================================================================================
+MSG: diagnostic_msgs/DiagnosticStatus
+byte OK=0
+byte WARN=1
+byte ERROR=2
+byte STALE=3
+byte level
+string name
+string message
+string hardware_id
+diagnostic_msgs/KeyValue[] values
+================================================================================
+MSG: diagnostic_msgs/KeyValue
+string key
+string value
+)";
+
 constexpr std::string_view odometry = R"(Header header
 string child_frame_id
 geometry_msgs/PoseWithCovariance pose
@@ -181,6 +242,9 @@ std::string_view known_definition(std::string_view type) {
   if (type == "livox_ros_driver2/CustomMsg") return livox;
   if (type == "tf2_msgs/TFMessage") return transforms;
   if (type == "nav_msgs/Odometry") return odometry;
+  if (type == "nav_msgs/Path") return path;
+  if (type == "geometry_msgs/PoseArray") return poses;
+  if (type == "diagnostic_msgs/DiagnosticArray") return diagnostics;
   if (type == "std_msgs/String") return "string data\n";
   return {};
 }

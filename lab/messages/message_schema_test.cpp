@@ -55,6 +55,9 @@ TEST(MessageSchema, SumsAreThoseOfRos) {
   }
   EXPECT_EQ(schema_of("nav_msgs/Odometry").md5(), "cd5e73d190d741a2f92e81eda573aca7");
   EXPECT_EQ(schema_of("tf2_msgs/TFMessage").md5(), "94810edda583a504dfda3829e70d7eec");
+  EXPECT_EQ(schema_of("nav_msgs/Path").md5(), "6227e2b7e9cce15051f669a5e197bbf7");
+  EXPECT_EQ(schema_of("geometry_msgs/PoseArray").md5(), "916c28c5764443f268b296bb671b9d97");
+  EXPECT_EQ(schema_of("diagnostic_msgs/DiagnosticArray").md5(), "60810da900de1dd6ddd437c3503511da");
   EXPECT_EQ(schema_of("sensor_msgs/CompressedImage").md5(), "8f7a12909da2c9d3332d540a0977563f");
   EXPECT_EQ(schema_of("std_msgs/String").md5(), "992ce8a1687cec8c8bd883ec73ca41d1");
 }

@@ -1,16 +1,10 @@
 // What every recording that is written is, whatever its format.
 #pragma once
 
-#include <stdexcept>
-
+#include "lab/mapping/output_error.hpp"
 #include "lab/recordings/recording_reader.hpp"
 
 namespace kilvo::lab {
-
-/// A file that cannot be created or written. The command line ends with exit code 2.
-struct OutputError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 class MessageWriter {
  public:
