@@ -66,12 +66,13 @@ void ResultFiles::write_events(const std::vector<Event>& events) {
 }
 
 void ResultFiles::write_contacts(const Output& output) {
-  if (!contacts_) contacts_.emplace(folder_ / "contacts.csv", "t,left,right,clearance_left,clearance_right,d_a,d_fv_left,d_fv_right");
+  if (!contacts_)
+    contacts_.emplace(folder_ / "contacts.csv", "t,left,right,clearance_left,clearance_right,d_a,d_fv_left,d_fv_right,p_left,p_right");
   const Contacts& c = *output.contacts;
   std::string line, t;
   lab::append_seconds(t, output.t);
-  fmt::format_to(std::back_inserter(line), "{},{:d},{:d},{:.5f},{:.5f},{:.4g},{:.4g},{:.4g}", t, c.on[0], c.on[1], c.clearance[0],
-                 c.clearance[1], c.d_a, c.d_fv[0], c.d_fv[1]);
+  fmt::format_to(std::back_inserter(line), "{},{:d},{:d},{:.5f},{:.5f},{:.4g},{:.4g},{:.4g},{:.3f},{:.3f}", t, c.on[0], c.on[1],
+                 c.clearance[0], c.clearance[1], c.d_a, c.d_fv[0], c.d_fv[1], c.probability[0], c.probability[1]);
   contacts_->write(line);
   for (const auto& [stage, microseconds] : {std::pair("kinematic", output.kinematic_us), std::pair("contact", output.contact_us)}) {
     timing_.write(fmt::format("{},{},{:.1f}", t, stage, microseconds));

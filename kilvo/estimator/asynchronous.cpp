@@ -50,16 +50,12 @@ void Estimator::handle_imu(ImuSample s, std::vector<Output>& out) {
   if (!last_legs_ || are_legs_overdue(s.t - *last_legs_, robot_.legs.rate, leg_period_)) emit(out);
 }
 
-// On the legs alone, or beside a LiDAR that is blind one way, a wrong velocity makes standing feet look as if they moved, so that they are
-// not used, and nothing mends it. No flight lasts this long: the velocity is taken as unknown, and the feet as standing.
-void Estimator::keep_a_stance(const LegStep& step, const std::array<bool, 2>& passed) {
-  const bool mended = modality_ != Modality::ki && unobservable_.isZero(0);
-  if (passed[0] || passed[1]) last_used_stance_ = step.t;
-  if (passed[0] || passed[1] || mended) last_stance_ = step.t;
+// On the legs alone one foot carries unless the IMU measures a flight; a long one is none.
+void Estimator::keep_a_stance(const LegStep& step) {
+  const bool carried = step.foot[0].used || step.foot[1].used;
+  if (carried) last_used_stance_ = step.t;
+  if (carried || modality_ != Modality::ki) last_stance_ = step.t;
   if (step.t - last_stance_ < longest_flight) return;
-  constexpr double unknown_velocity = 1.0;  // m/s
-  for (Estimate* e : {&*estimate_, &closed_}) e->P.diagonal().segment<3>(at::v).array() += unknown_velocity * unknown_velocity;
-  rebase(closed_);
   contacts_.restart();
   stances_.restart();
   last_stance_ = step.t;
@@ -92,7 +88,7 @@ void Estimator::handle_legs(const JointSample& s, std::vector<Output>& out) {
   const double kinematic_us = watch.lap_us();
 
   choose_modality(s.t);
-  keep_a_stance(step, passed);
+  keep_a_stance(step);
   emit(out, contacts_.contacts(), kinematic_us + std::exchange(closing_us_, 0), contact_us);
 }
 

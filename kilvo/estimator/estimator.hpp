@@ -118,7 +118,7 @@ class Estimator {
   // asynchronous.cpp: IMU and legs
   void handle_imu(ImuSample s, std::vector<Output>& out);
   void handle_legs(const JointSample& s, std::vector<Output>& out);
-  void keep_a_stance(const LegStep& step, const std::array<bool, 2>& passed);
+  void keep_a_stance(const LegStep& step);
 
   // switching.cpp: which sensors are used, and how they come back
   void inflate_velocity_covariance();

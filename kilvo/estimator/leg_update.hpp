@@ -5,7 +5,7 @@
 
 #include "kilvo/estimator/replay.hpp"
 #include "kilvo/legs/contact_detector.hpp"
-#include "kilvo/legs/leg_measurements.hpp"
+#include "kilvo/legs/stance_tracker.hpp"
 #include "kilvo/map/voxel_map.hpp"
 
 namespace kilvo {

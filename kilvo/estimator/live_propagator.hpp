@@ -10,7 +10,7 @@
 #include "kilvo/estimator/replay.hpp"
 #include "kilvo/legs/contact_detector.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
-#include "kilvo/legs/leg_measurements.hpp"
+#include "kilvo/legs/stance_tracker.hpp"
 #include "kilvo/sensors/robot.hpp"
 
 namespace kilvo {

@@ -5,39 +5,13 @@
 
 #include "kilvo/estimator/recovery.hpp"
 #include "kilvo/filter/update.hpp"
+#include "kilvo/legs/unobservable.hpp"
 
 namespace kilvo {
 
 void Replay::add(const ImuSample& s) {
   note_usual(s);
   imu_.push_back(s);
-}
-
-void Replay::note_usual(const ImuSample& s) {
-  if (imu_.empty()) {
-    usual_.gyro_mean = s.gyro;
-    usual_.accel_mean = s.accel;
-    return;
-  }
-  constexpr double memory = 2.0;  // s
-  const ImuSample& b = imu_.back();
-  const double dt = to_seconds(s.t - b.t), share = std::min(1.0, dt / memory);
-  const Eigen::Vector3d gyro = s.gyro - usual_.gyro_mean, accel = s.accel - usual_.accel_mean;
-  usual_.gyro_mean += share * gyro;
-  usual_.accel_mean += share * accel;
-  usual_.gyro_variance += share * (gyro.cwiseAbs2() - usual_.gyro_variance);
-  usual_.accel_variance += share * (accel.cwiseAbs2() - usual_.accel_variance);
-  // Neither what is missed nor a pair that came together counts for more than half of a period.
-  if (usual_.period == 0) usual_.period = dt;
-  usual_.period += (std::clamp(dt, 0.5 * usual_.period, 1.5 * usual_.period) - usual_.period) / 64;
-  if (imu_.size() < 2) return;
-  const ImuSample& a = imu_[imu_.size() - 2];
-  if (to_seconds(s.t - a.t) > 2.5 * usual_.period) return;
-  const double part = to_seconds(b.t - a.t) / to_seconds(s.t - a.t);
-  const double gyro2 = (b.gyro - a.gyro - part * (s.gyro - a.gyro)).squaredNorm() / 3;
-  const double accel2 = (b.accel - a.accel - part * (s.accel - a.accel)).squaredNorm() / 3;
-  usual_.gyro_bend2 = std::max(gyro2, (1 - share) * usual_.gyro_bend2);
-  usual_.accel_bend2 = std::max(accel2, (1 - share) * usual_.accel_bend2);
 }
 
 // Samples are missing: they lay beside the line between those that came.
@@ -81,7 +55,7 @@ bool Replay::is_blind(Time begin, Time end) const {
 ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const {
   ImuInterval interval = ImuInterval::between(a, b, begin, end);
   const double gap = to_seconds(b.t - a.t);
-  if (gap <= config_.max_imu_gap) {
+  if (gap <= longest_gap()) {
     inflate_for_clipping(interval, a, b);
     inflate_for_jump(interval, a, b);
     inflate_for_missed(interval, gap);
@@ -118,6 +92,7 @@ FootOrientations Replay::standing_at(Time t) const {
 void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   if (imu_.empty()) return;
   const FootOrientations feet = standing_at(e.t);
+  const ProcessNoise noise = noise_now();
   const auto step = [&](ImuInterval interval) {
     // What was missed or clipped is in no mean.
     interval.made_biases = is_of_rest(interval.end) && interval.gyro_scale == 1 && interval.accel_scale == 1;
@@ -125,7 +100,7 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
       interval.gyro_scale *= 1 - sweep_noise_.rotation;
       interval.velocity_scale *= 1 - sweep_noise_.position;
     }
-    e = predict(e, interval, feet, config_.noise);
+    e = predict(e, interval, feet, noise);
     if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
   };
   // The first sample after e.t.
@@ -141,19 +116,19 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   ImuSample held = imu_.back();
   held.t = until;
   // Within a period it is held; a copy of itself is no sample that says the same twice.
-  const bool is_gap = to_seconds(until - imu_.back().t) > config_.max_imu_gap;
+  const bool is_gap = to_seconds(until - imu_.back().t) > longest_gap();
   step(is_gap ? interval_between(imu_.back(), held, e.t, until, e.x) : ImuInterval::hold(held, e.t, until));
 }
 
 std::optional<Eigen::Vector3d> Replay::gyro_at(Time t) const {
   const auto next = std::lower_bound(imu_.begin(), imu_.end(), t, [](const ImuSample& s, Time value) { return s.t < value; });
   if (next == imu_.end()) {
-    if (to_seconds(t - imu_.back().t) > config_.max_imu_gap) return std::nullopt;
+    if (to_seconds(t - imu_.back().t) > longest_gap()) return std::nullopt;
     return imu_.back().gyro;
   }
   if (next == imu_.begin() || next->t == t) return next->gyro;
   const ImuSample& a = *(next - 1);
-  if (to_seconds(next->t - a.t) > config_.max_imu_gap) return std::nullopt;
+  if (to_seconds(next->t - a.t) > longest_gap()) return std::nullopt;
   return a.gyro + (to_seconds(t - a.t) / to_seconds(next->t - a.t)) * (next->gyro - a.gyro);
 }
 
@@ -178,26 +153,32 @@ LegModel::Used Replay::apply(Estimate& e, const LegStep& step, Gain<LegModel::ma
     if (foot.used && !foot.begins) move_stance(e, side, foot.shift);
     any = any || foot.used;
   }
+  if (step.gyro_bias) e = with_gyro_bias(e, *step.gyro_bias);
   if (!any || imu_.empty()) return {};
   // Without a rate the velocity of a foot that is a leg away from the IMU is anything.
   const auto gyro = gyro_at(step.t);
-  if (!gyro) return {{step.foot[0].used, step.foot[1].used}, {}};
+  if (!gyro) return {{step.foot[0].used, step.foot[1].used}, {}, {step.foot[0].used, step.foot[1].used}};
   LegModel model(step, *gyro, config_.legs);
   // The rows are nearly linear: one iteration.
   UpdateConfig once;
   once.max_iterations = 1;
-  Update done = update(e, model, once, nullptr, kept);
-  e = done.posterior;
-  if (done.rows == 0 && kept != nullptr) *kept = {};
+  Gain<LegModel::max_leg_rows> own;
+  Gain<LegModel::max_leg_rows>& gain = kept != nullptr ? *kept : own;
+  const Update done = update(e, model, once, nullptr, &gain);
+  if (done.rows > 0) {
+    e = considered(e, done.posterior, gain);
+  } else if (kept != nullptr) {
+    *kept = {};
+  }
   return model.used();
 }
 
 std::array<bool, 2> Replay::take(Estimate& e, const LegStep& step) {
   steps_.push_back(step);
-  if (taken_.size() == most_taken) return apply(e, step).motion;
+  if (taken_.size() == most_taken) return apply(e, step).fits;
   Taken& taken = taken_.emplace_back();
   taken.t = step.t;
-  return (taken.used = apply(e, step, &taken.gain)).motion;
+  return (taken.used = apply(e, step, &taken.gain)).fits;
 }
 
 bool Replay::retrace(Estimate& e, const Estimate& live, Time until, Trajectory* record) const {
@@ -210,14 +191,15 @@ bool Replay::retrace(Estimate& e, const Estimate& live, Time until, Trajectory* 
   if (a.t > e.t || !std::equal(taken, taken_.end(), step, steps_.end(), is_of)) return false;
   // What is only known now that the second sample has come: a gap, a jump, the end of its range.
   const ImuInterval whole = interval_between(a, b, e.t, until, e.x);
-  if (to_seconds(b.t - a.t) > config_.max_imu_gap || whole.gyro_scale != 1 || whole.accel_scale != 1) return false;
+  if (to_seconds(b.t - a.t) > longest_gap() || whole.gyro_scale != 1 || whole.accel_scale != 1) return false;
+  if (std::any_of(step, steps_.end(), [](const LegStep& s) { return s.gyro_bias.has_value(); })) return false;
   for (auto k = taken; k != taken_.end(); ++k, ++step) {
     const ImuInterval interval = ImuInterval::between(a, b, e.t, step->t);
     e.x = predict_mean(e.x, interval);
     e.t = step->t;
     place_stances(e.x, *step);
     const auto r = LegModel::residual(*step, e.x, interval.gyro_end, k->used);
-    if (r.size() > 0) e.x = boxplus(e.x, k->gain.step(r));
+    if (r.size() > 0) e.x = boxplus(e.x, without(heading_of(e.x), k->gain.step(r)));
     if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
   }
   e.P = live.P;

@@ -92,6 +92,8 @@ class Replay {
   void inflate_for_missed(ImuInterval& interval, double gap) const;
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
   FootOrientations standing_at(Time t) const;
+  double longest_gap() const;  // between IMU samples, s
+  ProcessNoise noise_now() const;
 
   struct SweepNoiseCorrelation {
     Time until{};
@@ -110,7 +112,8 @@ class Replay {
     double period = 0;  // s, of samples that follow each other
     Eigen::Vector3d gyro_mean = Eigen::Vector3d::Zero(), accel_mean = Eigen::Vector3d::Zero();
     Eigen::Vector3d gyro_variance = Eigen::Vector3d::Zero(), accel_variance = Eigen::Vector3d::Zero();
-    double gyro_bend2 = 0, accel_bend2 = 0;  // how far a sample lay beside the line between its neighbours at the most, squared
+    double gyro_density2 = 0, accel_density2 = 0;  // of the noise that second differences show, if it were white: (rad/s)^2 s, (m/s^2)^2 s
+    double gyro_bend2 = 0, accel_bend2 = 0;        // how far a sample lay beside the line between its neighbours at the most, squared
   };
   void note_usual(const ImuSample& s);
 

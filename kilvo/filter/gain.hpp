@@ -30,6 +30,7 @@ class Gain {
   void project(const Covariance& P, const Rows<Max>& rows);
   Eigen::Index rows() const { return W_.cols(); }
   Columns& W() { return W_; }
+  const Columns& W() const { return W_; }
   Square& S() { return S_; }
 
   /// From P H' to W, from S to L. False when S is not positive definite.

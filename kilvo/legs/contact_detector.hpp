@@ -4,9 +4,9 @@
 #include <variant>
 
 #include "kilvo/legs/contact_estimator.hpp"
-#include "kilvo/legs/leg_measurements.hpp"
 #include "kilvo/legs/paper_contacts.hpp"
 #include "kilvo/legs/simple_contacts.hpp"
+#include "kilvo/legs/stance_tracker.hpp"
 
 namespace kilvo {
 

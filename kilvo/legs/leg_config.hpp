@@ -10,10 +10,6 @@ namespace kilvo {
 
 struct LegConfig {
   std::string contact = "kilvo";           // kilvo | paper | variance | force
-  double lift_off_speed = 0.1;             // share of the robot's swing speed
-  double touchdown_speed = 0.06;           // share of the robot's swing speed
-  double impact_drop = 0.62;               // share of the speed before
-  double settling = 0.1;                   // s
   double velocity_sigma = 0.005;           // m/s
   double vertical_velocity_sigma = 0.025;  // m/s
   double velocity_correlation = 0.2;       // s
@@ -28,13 +24,6 @@ struct LegConfig {
         Field{"contact", &LegConfig::contact, "-",
               "how contacts are estimated; kilvo: our own way. To be compared with it: paper (Section V as printed), variance (of the "
               "acceleration), force (a threshold on what the joint efforts carry)"},
-        Field{"lift_off_speed", &LegConfig::lift_off_speed, "-",
-              "a foot none of whose corners is slower than this share of the robot's own swing speed has left the ground"},
-        Field{"touchdown_speed", &LegConfig::touchdown_speed, "-",
-              "a descending foot with a corner slower than this share of the swing speed has reached the ground"},
-        Field{"impact_drop", &LegConfig::impact_drop, "-",
-              "a descending foot whose speed falls below this share of its largest within 20 ms has reached the ground"},
-        Field{"settling", &LegConfig::settling, "s", "after touchdown a foot needs seven times the speed to be called lifted, for so long"},
         Field{"velocity_sigma", &LegConfig::velocity_sigma, "m/s", "standard deviation of the velocity of a standing foot"},
         Field{"vertical_velocity_sigma", &LegConfig::vertical_velocity_sigma, "m/s",
               "the same along the vertical, where soles settle and roll alike at every step"},

@@ -10,6 +10,7 @@
 #include "kilvo/legs/contact_estimator.hpp"
 #include "kilvo/legs/leg_config.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
+#include "kilvo/legs/standing_rate.hpp"
 
 namespace kilvo {
 
@@ -24,13 +25,16 @@ struct Stance {
   std::optional<Eigen::Matrix<double, 7, 1>> row_scale;  // another one on that of each: velocity, position, height
   SO3 R_IF;
   std::optional<GroundPatch> ground;  // on which it has just come down: its height counts once
+  std::optional<GroundPatch> level;   // the same, relative to the other foot, which stands: normal and sigma
 };
 
 /// One leg sample, ready for the filter: it can be applied again when the state before it has been corrected.
 struct LegStep {
   Time t{};
-  double dt = 0;  // since the sample before, s
+  double dt = 0;                                           // since the sample before, s
+  double velocity_sigma = 0, vertical_velocity_sigma = 0;  // of a standing sole along each horizontal axis and the vertical, m/s
   std::array<Stance, 2> foot;
+  std::optional<GyroBiasReading> gyro_bias;
 };
 
 /// r = v + R (omega x p + v_fk), the velocity of the contact point in the world (Eq. 5, first row); J over (R, p, v, bg).
@@ -67,6 +71,7 @@ class LegModel {
   /// Of the last evaluation: which feet passed, and which of them came down on known ground.
   struct Used {
     std::array<bool, 2> motion = {false, false}, height = {false, false};
+    std::array<bool, 2> fits = {false, false};  // no row of it is beyond the gate
     int rows() const { return 6 * (motion[0] + motion[1]) + height[0] + height[1]; }
   };
   const Used& used() const { return used_; }
@@ -76,8 +81,7 @@ class LegModel {
 
  private:
   using LegRows = Rows<max_leg_rows>;
-  bool moves(const Covariance& prior, std::size_t side, const Eigen::Vector3d& velocity, const Eigen::Vector3d& offset) const;
-  bool add_motion(LegRows& rows, int count, std::size_t side, const State& x, const Covariance& prior) const;
+  void add_motion(LegRows& rows, int count, std::size_t side, const State& x, const Covariance& prior);
   bool add_height(LegRows& rows, int count, std::size_t side, const State& x, const Covariance& prior) const;
 
   const LegStep& step_;
@@ -94,40 +98,5 @@ void move_stance(Estimate& e, std::size_t side, const Eigen::Vector3d& shift);
 void place_stances(State& x, const LegStep& step);
 /// Takes it out: its rows and columns become zero.
 void end_stance(Estimate& e, std::size_t side);
-
-/// Turns contacts into stances: when a foot enters and leaves the filter, and on which point of its sole it stands.
-class StanceTracker {
- public:
-  explicit StanceTracker(const LegConfig& config) : config_(config) {}
-
-  /// Whether the map's ground holds the feet, or how they stand on it is learned, since the height is known better without.
-  enum class Ground : std::uint8_t { use, learn };
-
-  /// `omega`: bias-free, rad/s. `sigma_v`: uncertainty of the velocity of x, m/s. `map`: on whose planes the feet come down.
-  LegStep step(const Feet& feet, const Contacts& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0,
-               const VoxelMap* map = nullptr, Ground ground = Ground::use);
-
-  /// Both feet leave the filter at the next step, to enter anew.
-  void restart();
-  /// Which feet's rows were used of the last step. A foot that is refused for a while leaves; once it has come to rest it enters anew,
-  /// where it then is.
-  void judge(const LegStep& step, const std::array<bool, 2>& passed);
-  bool standing(std::size_t side) const { return weights_[side].has_value(); }
-
- private:
-  using Weights = std::array<double, max_corners>;
-  std::optional<GroundPatch> ground_under(const VoxelMap& map, const Eigen::Vector3d& p_W, const Eigen::Vector3d& up_W, Ground ground);
-  bool may_stand(std::size_t side, double speed2, double sigma_v);
-  bool stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega);
-  LegConfig config_;
-  std::optional<Time> last_;
-  std::array<std::optional<Weights>, 2> weights_;  // of each standing foot
-  double sink_ = 0, sink_variance_ = 0;            // of the feet over the map's planes, as learned, m
-  std::array<bool, 2> leave_ = {false, false};
-  std::array<bool, 2> slid_ = {false, false};   // left because it moved
-  std::array<std::optional<Time>, 2> refused_;  // since when
-  std::array<FootPose, 2> last_pose_;
-  std::array<Time, 2> changed_{};  // when the encoders of the foot last said something new
-};
 
 }  // namespace kilvo

@@ -174,6 +174,7 @@ const Contacts& PaperContactEstimator::update(const Feet& feet, const State& x, 
     }
     contacts_.ground[side] = f.ground;
   }
+  for (std::size_t side = 0; side < 2; ++side) contacts_.probability[side] = contacts_.on[side] ? 1 : 0;
   return contacts_;
 }
 

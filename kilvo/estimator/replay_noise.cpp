@@ -1,0 +1,55 @@
+// What the IMU's samples of the last seconds say of its noise.
+#include <algorithm>
+#include <cmath>
+
+#include "kilvo/estimator/replay.hpp"
+
+namespace kilvo {
+
+void Replay::note_usual(const ImuSample& s) {
+  if (imu_.empty()) {
+    usual_.gyro_mean = s.gyro;
+    usual_.accel_mean = s.accel;
+    return;
+  }
+  constexpr double memory = 2.0;  // s
+  const ImuSample& b = imu_.back();
+  const double dt = to_seconds(s.t - b.t), share = std::min(1.0, dt / memory);
+  const Eigen::Vector3d gyro = s.gyro - usual_.gyro_mean, accel = s.accel - usual_.accel_mean;
+  usual_.gyro_mean += share * gyro;
+  usual_.accel_mean += share * accel;
+  usual_.gyro_variance += share * (gyro.cwiseAbs2() - usual_.gyro_variance);
+  usual_.accel_variance += share * (accel.cwiseAbs2() - usual_.accel_variance);
+  // Neither what is missed nor a pair that came together counts for more than half of a period.
+  if (usual_.period == 0) usual_.period = dt;
+  usual_.period += (std::clamp(dt, 0.5 * usual_.period, 1.5 * usual_.period) - usual_.period) / 64;
+  if (imu_.size() < 2) return;
+  const ImuSample& a = imu_[imu_.size() - 2];
+  if (to_seconds(s.t - a.t) > 2.5 * usual_.period) return;
+  const double part = to_seconds(b.t - a.t) / to_seconds(s.t - a.t);
+  const double gyro2 = (b.gyro - a.gyro - part * (s.gyro - a.gyro)).squaredNorm() / 3;
+  const double accel2 = (b.accel - a.accel - part * (s.accel - a.accel)).squaredNorm() / 3;
+  usual_.gyro_bend2 = std::max(gyro2, (1 - share) * usual_.gyro_bend2);
+  usual_.accel_bend2 = std::max(accel2, (1 - share) * usual_.accel_bend2);
+  // Half of a second difference: of white noise it has one and a half times the variance.
+  constexpr double white = 2.0 / 3.0, noise_memory = 0.5;
+  const double count = std::min(1.0, dt / noise_memory);
+  usual_.gyro_density2 += count * (white * gyro2 * dt - usual_.gyro_density2);
+  usual_.accel_density2 += count * (white * accel2 * dt - usual_.accel_density2);
+}
+
+double Replay::longest_gap() const { return std::max(config_.max_imu_gap, 2.5 * usual_.period); }
+
+// What varies faster than the rate of the IMU is folded into it. As far as it is more than the settings say, a part of it stays in the
+// integral: the samples that follow do not take it all back.
+ProcessNoise Replay::noise_now() const {
+  ProcessNoise noise = config_.noise;
+  if (usual_.period <= 0) return noise;
+  const double share = 0.4, gyro_share = 0.1, period2 = usual_.period * usual_.period;
+  const double expected = noise.accel * noise.accel + 2 * noise.velocity * noise.velocity / period2;
+  noise.accel = std::sqrt(noise.accel * noise.accel + share * share * std::max(0.0, usual_.accel_density2 - expected));
+  noise.gyro = std::sqrt(noise.gyro * noise.gyro + gyro_share * gyro_share * usual_.gyro_density2);
+  return noise;
+}
+
+}  // namespace kilvo

@@ -1,0 +1,71 @@
+// Which feet carry: a Bayes filter over the four states of a biped (both feet, the left one, the right one, none). What each cue looks like
+// in each state is learnt from this robot while it walks; docs/decisions/2026-11-22-contact-as-probability.md says why.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "kilvo/math/running_statistics.hpp"
+
+namespace kilvo {
+
+/// What one leg sample says of the contacts, without units: lengths as shares of the leg's length l (height of the IMU over the lower
+/// sole), speeds as shares of sqrt(g l), the forces as shares of the weight.
+struct ContactCues {
+  double dt = 0;                                // since the sample before, s
+  std::array<double, 2> speed = {0, 0};         // of the point on which the foot would stand
+  double known_velocity = 1;                    // 0 to 1: how much the speeds say, when the velocity of the body is not well known
+  double height = 0;                            // of the left sole over the right one, along the normal of the ground
+  double force_side = 0.5;                      // where the line of the specific force meets the ground: 0 at the right foot, 1 at the left
+  double load = 1;                              // specific force
+  std::array<bool, 2> impact = {false, false};  // the foot has just been stopped
+};
+
+class ContactFilter {
+ public:
+  enum State : std::size_t { both, left, right, none, states };
+
+  ContactFilter();
+
+  void update(const ContactCues& cues);
+
+  /// Of each state; they add up to 1.
+  const std::array<double, states>& probabilities() const { return pi_; }
+  /// That this foot carries: 0 left, 1 right.
+  double carries(std::size_t side) const { return pi_[both] + pi_[side == 0 ? left : right]; }
+
+  /// Speeds without unit, as learnt: of a supporting foot (median), of a swinging one, and what lies between.
+  double stance_speed() const;
+  double swing_speed() const;
+  double threshold_speed() const;
+  /// A supporting foot is slower than this for five samples out of six.
+  double fast_stance() const;
+
+  /// Forgets which feet stand, not what has been learnt.
+  void restart();
+
+ private:
+  using Likelihood = std::array<double, states>;
+  void add_speed(const ContactCues& cues, Likelihood& log) const;
+  void add_height(double height, Likelihood& log) const;
+  void add_force_side(double side, Likelihood& log) const;
+  void add_impacts(const ContactCues& cues, Likelihood& log);
+  void transit(double dt);
+  void learn(const ContactCues& cues);
+  double worth_of_impact() const;
+
+  std::array<double, states> pi_;
+  RunningStatistics stance_, swing_;                // ln of the speed
+  RunningStatistics lifted_, level_;                // height of a swinging foot over the other; of two that stand
+  RunningStatistics on_left_, on_right_, on_both_;  // where the line of force meets the ground
+  double since_support_ = 1e9;                      // s since one foot carried alone
+  // How well impacts tell touchdowns on this robot.
+  struct Landing {
+    bool stood = true, seen = false;  // seen: an impact has counted in this swing
+    double since_impact = 1e9, since_touchdown = 1e9;
+  };
+  std::array<Landing, 2> landing_;
+  double hits_ = 0, touchdowns_ = 0, false_impacts_ = 0, swing_time_ = 0;
+};
+
+}  // namespace kilvo

@@ -1,0 +1,177 @@
+#include "kilvo/legs/stance_tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace kilvo {
+namespace {
+
+// The corners of a rolling sole that are this much faster than the slowest one carry e^-0.5 of its weight, m/s.
+constexpr double rolling_speed = 0.005;
+// The same as a share of what a supporting sole seems to move by.
+constexpr double rolling_share = 0.3;
+// alpha_s of Eq. 8, of the standard deviation.
+constexpr double loosest = 10;
+// Beyond the gate for so long, a foot has another place.
+constexpr Duration longest_refusal = std::chrono::milliseconds(20);
+// Encoders that repeat every bit for so long, while the other foot's do not and the body turns faster than this (rad/s), are frozen.
+constexpr Duration longest_stillness = std::chrono::milliseconds(50);
+constexpr double surely_turning = 0.1;
+// How much one touchdown counts in what is learned of the ground.
+constexpr double sink_share = 0.15;
+// A foot enters loosely and settles over this time, s.
+constexpr double entry_time = 0.02;
+constexpr double shortest_step = 1e-4, longest_step = 0.05;  // s
+
+// How much each corner of a sole carries, which adds up to one.
+std::array<double, max_corners> share_of_corners(const FootPose& pose, const State& x, const Eigen::Vector3d& omega, double rolling) {
+  std::array<double, max_corners> out{};
+  double least = std::numeric_limits<double>::infinity();
+  std::array<double, max_corners> speed2{};
+  const auto corners = static_cast<std::size_t>(pose.corners);
+  for (std::size_t k = 0; k < corners; ++k) {
+    speed2[k] = velocity_W(x, pose.p[k], pose.v[k], omega).squaredNorm();
+    least = std::min(least, speed2[k]);
+  }
+  double sum = 0;
+  for (std::size_t k = 0; k < corners; ++k) {
+    out[k] = std::exp((least - speed2[k]) / (2 * rolling * rolling));
+    sum += out[k];
+  }
+  for (std::size_t k = 0; k < corners; ++k) out[k] /= sum;
+  return out;
+}
+
+}  // namespace
+
+StanceTracker::StanceTracker(const LegConfig& config) : config_(config), step_height_(0, 0.01, 1, 5), noise_(config) {}
+
+void StanceTracker::restart() {
+  for (std::size_t side = 0; side < 2; ++side) {
+    leave_[side] = leave_[side] || weights_[side].has_value();
+    weights_[side].reset();
+  }
+  last_.reset();
+}
+
+void StanceTracker::judge(const LegStep& step, const std::array<bool, 2>& passed) {
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!step.foot[side].used || passed[side]) {
+      refused_[side].reset();
+      continue;
+    }
+    if (!refused_[side]) refused_[side] = step.t;
+    if (step.t - *refused_[side] < longest_refusal) continue;
+    refused_[side].reset();
+    leave_[side] = true;
+    weights_[side].reset();
+  }
+}
+
+// A sole sinks into soft ground, grass hides it from the LiDAR, few points near the robot make a plane that is off: all of that is alike
+// from step to step, so what it was while the LiDAR knew the height is taken off when it does not.
+std::optional<GroundPatch> StanceTracker::ground_under(const VoxelMap& map, const Eigen::Vector3d& p_W, const Eigen::Vector3d& up_W,
+                                                       Ground ground) {
+  auto patch = GroundLookup::of_map(map, p_W, up_W);
+  if (!patch) return std::nullopt;
+  if (ground == Ground::learn) {
+    const double off = patch->height_of(p_W) - sink_;
+    sink_ += sink_share * off;
+    sink_variance_ += sink_share * (off * off - sink_variance_);
+    return std::nullopt;
+  }
+  patch->point += sink_ * patch->normal;
+  patch->sigma = std::sqrt(patch->sigma * patch->sigma + sink_variance_);
+  return patch;
+}
+
+// The feet whose rows are used. Of a robot that does not fly one carries at any time: when none is believed to, the more probable.
+std::array<bool, 2> StanceTracker::carriers(const Contacts& contacts) const {
+  std::array<bool, 2> out = contacts.on;
+  const auto [left, right] = contacts.probability;
+  if (!out[0] && !out[1]) {
+    if (contacts.flight) return out;
+    const bool left_carries = left != right ? left > right : contacts.since[0] > contacts.since[1];
+    out[left_carries ? 0 : 1] = true;
+    return out;
+  }
+  if (!out[0] || !out[1]) return out;
+  // A foot that has just come down settles first, while the other carries.
+  const std::size_t newer = contacts.phase(0) < contacts.phase(1) ? 0 : 1;
+  if (contacts.phase(newer) < config_.entry_delay && contacts.phase(1 - newer) > contacts.phase(newer)) out[newer] = false;
+  return out;
+}
+
+// A step up or down is as likely as the last ones were high.
+std::optional<GroundPatch> StanceTracker::level_with_other(std::size_t side, const Eigen::Vector3d& p_W, const State& x,
+                                                           const Eigen::Vector3d& normal_W) {
+  constexpr double least_step = 0.005, most_step = 0.03, stair = 0.1;  // m
+  // The normal of the ground is off by the same for many steps.
+  constexpr double doubt = 2;
+  if (!weights_[1 - side]) return std::nullopt;
+  const double height = normal_W.dot(p_W - x.pc[1 - side]);
+  const double sigma = std::clamp(doubt * step_height_.rms(), least_step, most_step);
+  if (std::abs(height) < stair) step_height_.add(height, 1);
+  return GroundPatch{normal_W, x.pc[1 - side], sigma};
+}
+
+// True while the encoders of this foot are frozen.
+bool StanceTracker::stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega) {
+  const FootPose& now = feet.foot[side];
+  FootPose& last = last_pose_[side];
+  if (now.corners != last.corners || now.p[0] != last.p[0] || now.v[0] != last.v[0]) changed_[side] = feet.t;
+  last = now;
+  return feet.t - changed_[side] > longest_stillness && changed_[1 - side] > changed_[side] && omega.norm() > surely_turning;
+}
+
+LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v,
+                            const VoxelMap* map, Ground ground) {
+  LegStep out;
+  out.t = feet.t;
+  out.dt = last_ ? std::clamp(to_seconds(feet.t - *last_), shortest_step, longest_step) : longest_step;
+  last_ = feet.t;
+  const std::array<bool, 2> carries = carriers(contacts);
+  out.velocity_sigma = noise_.horizontal();
+  out.vertical_velocity_sigma = noise_.vertical();
+  out.gyro_bias = standing_rate_.add(feet, contacts, omega + x.bg);
+  for (std::size_t side = 0; side < 2; ++side) {
+    const FootPose& pose = feet.foot[side];
+    Stance& foot = out.foot[side];
+    foot.ends = std::exchange(leave_[side], false);
+    foot.R_IF = pose.R_IF;
+    const double phase = contacts.phase(side);
+    const double rolling = std::max(rolling_speed, rolling_share * contacts.sole_speed);
+    const auto weights = share_of_corners(pose, x, omega, rolling);
+    if (stuck(side, feet, omega) || !carries[side]) {
+      foot.ends = foot.ends || weights_[side].has_value();
+      weights_[side].reset();
+      noise_.interrupt(side);
+      continue;
+    }
+    foot.begins = !weights_[side].has_value();
+    foot.used = true;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(pose.corners); ++k) {
+      foot.point.p += weights[k] * pose.p[k];
+      foot.point.v += weights[k] * pose.v[k];
+      if (!foot.begins) foot.shift += (weights[k] - (*weights_[side])[k]) * pose.p[k];
+    }
+    weights_[side] = weights;
+    if (foot.begins && map != nullptr) foot.ground = ground_under(*map, x.pose() * foot.point.p, -x.g.normalized(), ground);
+    if (foot.begins && !foot.ground && ground == Ground::use)
+      foot.level = level_with_other(side, x.pose() * foot.point.p, x, contacts.normal);
+    // Eq. 8: what moves is believed less; so is what has just arrived.
+    const Eigen::Vector3d velocity = velocity_W(x, foot.point.p, foot.point.v, omega);
+    const double moving2 = velocity.squaredNorm();
+    if (phase > config_.entry_delay + entry_time) noise_.add(side, velocity, -x.g.normalized(), out.dt);
+    const double noise2 = out.velocity_sigma * out.velocity_sigma + sigma_v * sigma_v;
+    const double entering = std::clamp(1.0 - (phase - config_.entry_delay) / entry_time, 0.0, 1.0);
+    // As much as the noise across on all three axes is no motion.
+    const double loose = 1.0 + std::max(0.0, moving2 / noise2 - 3.0) + (loosest - 1) * entering;
+    foot.variance_scale = std::min(loose / std::max(0.01, contacts.probability[side]), loosest * loosest);
+  }
+  return out;
+}
+
+}  // namespace kilvo

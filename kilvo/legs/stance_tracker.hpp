@@ -1,0 +1,56 @@
+// When a foot enters and leaves the filter, on which point of its sole it stands, and how firmly.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "kilvo/legs/contact_estimator.hpp"
+#include "kilvo/legs/leg_config.hpp"
+#include "kilvo/legs/leg_kinematics.hpp"
+#include "kilvo/legs/leg_measurements.hpp"
+#include "kilvo/legs/sole_noise.hpp"
+#include "kilvo/math/running_statistics.hpp"
+
+namespace kilvo {
+
+/// Turns contacts into stances: when a foot enters and leaves the filter, and on which point of its sole it stands.
+class StanceTracker {
+ public:
+  explicit StanceTracker(const LegConfig& config);
+
+  /// Whether the map's ground holds the feet, or how they stand on it is learned, since the height is known better without.
+  enum class Ground : std::uint8_t { use, learn };
+
+  /// `omega`: bias-free, rad/s. `sigma_v`: uncertainty of the velocity of x, m/s. `map`: on whose planes the feet come down.
+  LegStep step(const Feet& feet, const Contacts& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0,
+               const VoxelMap* map = nullptr, Ground ground = Ground::use);
+
+  /// Both feet leave the filter at the next step, to enter anew.
+  void restart();
+  /// Which feet's rows were within their gates of the last step. A foot that is beyond for a while has slipped: it enters anew, where it
+  /// then is.
+  void judge(const LegStep& step, const std::array<bool, 2>& passed);
+  bool standing(std::size_t side) const { return weights_[side].has_value(); }
+
+ private:
+  using Weights = std::array<double, max_corners>;
+  std::optional<GroundPatch> ground_under(const VoxelMap& map, const Eigen::Vector3d& p_W, const Eigen::Vector3d& up_W, Ground ground);
+  std::array<bool, 2> carriers(const Contacts& contacts) const;
+  std::optional<GroundPatch> level_with_other(std::size_t side, const Eigen::Vector3d& p_W, const State& x,
+                                              const Eigen::Vector3d& normal_W);
+  bool stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega);
+  LegConfig config_;
+  std::optional<Time> last_;
+  std::array<std::optional<Weights>, 2> weights_;  // of each standing foot
+  double sink_ = 0, sink_variance_ = 0;            // of the feet over the map's planes, as learned, m
+  std::array<bool, 2> leave_ = {false, false};
+  RunningStatistics step_height_;               // of a foot that comes down, over the plane through the other, m
+  std::array<std::optional<Time>, 2> refused_;  // since when
+  std::array<FootPose, 2> last_pose_;
+  std::array<Time, 2> changed_{};  // when the encoders of the foot last said something new
+  SoleNoise noise_;
+  StandingRate standing_rate_;
+};
+
+}  // namespace kilvo
