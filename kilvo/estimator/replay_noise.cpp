@@ -45,10 +45,10 @@ double Replay::longest_gap() const { return std::max(config_.max_imu_gap, 2.5 * 
 ProcessNoise Replay::noise_now() const {
   ProcessNoise noise = config_.noise;
   if (usual_.period <= 0) return noise;
-  const double share = 0.4, gyro_share = 0.1, period2 = usual_.period * usual_.period;
-  const double expected = noise.accel * noise.accel + 2 * noise.velocity * noise.velocity / period2;
+  constexpr double share = 0.4, gyro_share = 0.1;
+  const double expected = noise.accel * noise.accel + 2 * noise.velocity * noise.velocity / (usual_.period * usual_.period);
   noise.accel = std::sqrt(noise.accel * noise.accel + share * share * std::max(0.0, usual_.accel_density2 - expected));
-  noise.gyro = std::sqrt(noise.gyro * noise.gyro + gyro_share * gyro_share * usual_.gyro_density2);
+  noise.gyro = std::max(noise.gyro, gyro_share * std::sqrt(usual_.gyro_density2));
   return noise;
 }
 
