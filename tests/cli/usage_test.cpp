@@ -65,7 +65,7 @@ TEST(Usage, HelpAndVersionGoToStdout) {
   EXPECT_EQ(version.out, "kilvo 0.1.0\n");
   const Finished help = kilvo({"--help"});
   EXPECT_EQ(help.code, 0);
-  for (const char* verb : {"run", "info", "eval", "compare", "eval-contacts", "report", "config", "demo"}) {
+  for (const char* verb : {"run", "live", "info", "eval", "compare", "eval-contacts", "report", "config", "demo"}) {
     EXPECT_THAT(help.out, HasSubstr(verb));
     const Finished its_help = kilvo({verb, "--help"});
     EXPECT_EQ(its_help.code, 0) << verb;
