@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include "apps/cli/description_watch.hpp"
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/held_output.hpp"
 #include "apps/cli/interrupt.hpp"
@@ -80,6 +81,7 @@ class Run {
                                                           std::array{settings_.robot.feet[0].name, settings_.robot.feet[1].name})
                           : nullptr),
         skeleton_(options.out / "skeleton.csv", settings_.robot),
+        description_(settings_.robot, options.threads > 1 || options.realtime),
         progress_(Progress::style_for(options.quiet)) {
     if (!options.quiet) tell_start(facts_, source_, options.no_deskew);
   }
@@ -92,6 +94,7 @@ class Run {
     if (log_) log_->close();
     skeleton_.close();
     facts_.failure = failure(interrupted);
+    if (!interrupted) hold_against_description();
     for (const Sensor sensor : facts_.sensors) facts_.withheld[static_cast<std::size_t>(sensor)] = failing_.dropped(sensor);
     const lab::MapBuilder& map = map_.finish();
     if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map, levelling_.turn().value_or(SO3()));
@@ -103,6 +106,15 @@ class Run {
   }
 
  private:
+  // What the first seconds say about the description: a run with a wrong one has failed, however good it looks.
+  void hold_against_description() {
+    for (const lab::Finding& finding : description_.findings()) {
+      facts_.warnings.push_back(fmt::format("{}; {}", finding.text, finding.remedy));
+      if (!facts_.failure.empty() || !DescriptionWatch::spoils(finding)) continue;
+      facts_.failure = fmt::format("the robot's description is wrong: {} (kilvo doctor shows the evidence)", finding.text);
+    }
+  }
+
   // True when the user stopped it.
   bool replay() {
     ReadAhead input(
@@ -111,6 +123,7 @@ class Run {
     while (auto measurement = input.next()) {
       require_legs(*measurement);
       skeleton_.add(*measurement);
+      description_.take(*measurement);
       keep(estimator_.push(*std::move(measurement)));
       progress_.update(input.progress(), [this] { return progress_note(); });
       interrupted = interrupt_.requested();
@@ -143,6 +156,7 @@ class Run {
     while (auto measurement = input.next()) {
       require_legs(*measurement);
       skeleton_.add(*measurement);
+      description_.take(*measurement);
       interrupted = !pace.wait_for(input.arrived(), interrupt_);
       if (interrupted || runner.failed()) break;
       runner.push(*std::move(measurement));
@@ -242,6 +256,7 @@ class Run {
   ResultFiles files_;
   std::unique_ptr<lab::RunLog> log_;
   SkeletonFile skeleton_;
+  DescriptionWatch description_;
   Levelling levelling_;
   std::vector<HeldOutput> waiting_;  // until the world is level
   Progress progress_;

@@ -246,61 +246,16 @@ void Examination::examine_leg_rotation() {
   }
   const double sigma = fit.offset_sigma();
   const std::string clock = fmt::format("{:.1f} ms against the IMU, standard deviation {:.1f} ms", 1e3 * fit.offset, 1e3 * sigma);
+  if (robot_.legs.clock != "stamp") {
+    check(Sensor::legs, "clock", Check::Verdict::good, clock + ": found by the estimator itself (legs.clock)");
+    return;
+  }
   if (std::abs(fit.offset) < std::max(clock_tolerance, sure * sigma) || fit.explained < 0.6) {
     check(Sensor::legs, "clock", fit.explained < 0.6 ? Check::Verdict::unknown : Check::Verdict::good, clock);
     leg_offset_ = 0;
   } else {
     find_offset(Sensor::legs, fit.offset, sigma, "turning of the legs against the gyro's");
   }
-}
-
-// The IMU sits turned against the description: on another link of the URDF, the wrong way round, or just so. `measured`: R_link_imu.
-void Examination::settle_imu_link(const SO3& measured) {
-  const SO3 described = robot_.imu.T_link_imu.R;
-  const double angle = degrees((measured * described.inverse()).Log().norm());
-  Finding f;
-  f.sensor = Sensor::imu;
-  f.cause = "imu_mount_rotation";
-  if (degrees((measured * described).Log().norm()) < 0.15 * angle + 1) {
-    f.text = "the IMU's mount on the robot is given the wrong way round";
-    const SE3 inverse = robot_.imu.T_link_imu.inverse();
-    robot_.imu.T_link_imu = {measured, inverse.p};
-    f.changes.push_back({"imu.T_link_imu.p", vector_text(inverse.p)});
-    find_rotation(std::move(f), described, inverse.R, "imu.T_link_imu.R");
-    return;
-  }
-  const GyroPath path = gyro();
-  std::string link;
-  double best = legs_.explained - 0.05, nearest = 0.5 * angle;
-  for (const std::string& name : link_names(robot_.urdf)) {
-    if (name == robot_.imu.link) continue;
-    LegHypothesis h;
-    h.robot = [&name](Robot& r) { r.imu.link = name; };
-    const std::vector<Turn> turns = leg_turns(legs_under(&h), interval);
-    if (turns.size() < 30) continue;
-    const double explained = explained_by(turns, path, leg_offset_, described.inverse().matrix());
-    const MountFit fit = fit_mount(turns, path, described.inverse(), leg_offset_);
-    const double off = degrees((fit.R * described).Log().norm());
-    if (!fit.fit.good || explained < best || off > std::min(nearest, 2.5)) continue;
-    nearest = off;
-    link = name;
-  }
-  if (!link.empty()) {
-    f.cause = "imu_link";
-    f.text = fmt::format("the IMU turns with link {}, not with link {}", link, robot_.imu.link);
-    f.evidence = fmt::format("its mount is {:.1f} degrees from the description on {}, {:.1f} on {}", nearest, link, angle, robot_.imu.link);
-    f.remedy = fmt::format("imu.T_link_imu.link: {}", link);
-    f.size = angle;
-    f.unit = fmt::format("deg");
-    f.changes = {{"imu.T_link_imu.link", link}};
-    robot_.imu.link = link;
-    find(std::move(f));
-    return;
-  }
-  f.text = fmt::format("the IMU is turned on its link {} by {} of the link against the description", robot_.imu.link,
-                       turn_text(measured * described.inverse()));
-  robot_.imu.T_link_imu.R = measured;
-  find_rotation(std::move(f), described, measured, "imu.T_link_imu.R");
 }
 
 }  // namespace kilvo::lab

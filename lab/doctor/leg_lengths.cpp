@@ -189,41 +189,4 @@ void Examination::accuse_leg_lengths(double scale, double height) {
   find(std::move(f));
 }
 
-// Another link that turns with this one would put the IMU at the right height: then the link is wrong, else the place on it.
-std::string Examination::link_at_height(double height) const {
-  const std::vector<LegPose> here = legs_under(nullptr);
-  if (here.empty() || !translation_ || way_.empty()) return "";
-  const Eigen::Vector3d up_I =
-      robot_.lidar.T_imu_lidar.R * (way_.front().T_WL.R.inverse() * Eigen::Vector3d(-translation_->g_W.normalized()));
-  const Eigen::Vector3d up = robot_.imu.T_link_imu.R * up_I;
-  for (const std::string& name : link_names(robot_.urdf)) {
-    if (name == robot_.imu.link) continue;
-    LegHypothesis h;
-    h.robot = [&name](Robot& r) { r.imu.link = name; };
-    const std::vector<LegPose> there = legs_under(&h);
-    if (there.size() != here.size()) continue;
-    const auto same = [&](std::size_t i) {
-      const FootPose &a = here[i].foot[0], &b = there[i].foot[0];
-      const double moved = up.dot(b.p[0] - a.p[0]);
-      // Feet that lie higher in the link's frame let the LiDAR stand lower.
-      return (b.R_IF.inverse() * a.R_IF).Log().norm() < 0.02 && std::abs(height - moved) < 0.5 * height_tolerance;
-    };
-    if (same(0) && same(here.size() / 2) && same(here.size() - 1)) return name;
-  }
-  return "";
-}
-
-void Examination::accuse_imu_place(double height) {
-  Finding f{Sensor::imu, "imu_mount_position", {}, {}, {}, height, fmt::format("m"), {}, true};
-  f.text = fmt::format("the IMU sits {:.1f} cm {} on the robot than described", 100 * std::abs(height), height > 0 ? "lower" : "higher");
-  f.remedy = "imu.T_link_imu.p, or its link";
-  if (const std::string link = link_at_height(height); !link.empty()) {
-    f.cause = "imu_link";
-    f.text += fmt::format(": as if on link {} instead of {}", link, robot_.imu.link);
-    f.remedy = fmt::format("imu.T_link_imu.link: {}", link);
-    f.changes = {{"imu.T_link_imu.link", link}};
-  }
-  find(std::move(f));
-}
-
 }  // namespace kilvo::lab
