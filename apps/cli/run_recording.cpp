@@ -183,6 +183,8 @@ class Run {
     for (Output& output : outputs) {
       if (output.epoch > 0) continue;  // of another recording: failure() says so
       if (settings_.estimator.gravity_align) levelling_.add(output);
+      if (log_) log_->write_state(output);
+      if (log_) log_->write_sweep(output);
       keep_map(output);
       waiting_.emplace_back(std::move(output));
     }
@@ -195,8 +197,6 @@ class Run {
       Output output = held.output();
       if (levelling_.turn()) Levelling::apply(*levelling_.turn(), output);
       files_.write(output);
-      if (log_) log_->write_state(output);
-      if (log_) log_->write_sweep(output);
     }
     waiting_.clear();
   }
