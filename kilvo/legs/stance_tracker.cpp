@@ -165,9 +165,10 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     const Eigen::Vector3d velocity = velocity_W(x, foot.point.p, foot.point.v, omega);
     const double moving2 = velocity.squaredNorm();
     if (phase > config_.entry_delay + entry_time) noise_.add(side, velocity, -x.g.normalized(), out.dt);
-    const double noise2 = out.velocity_sigma * out.velocity_sigma + sigma_v * sigma_v;
+    const double usual2 = contacts.sole_speed * contacts.sole_speed / 3;
+    const double noise2 = std::max(config_.velocity_sigma * config_.velocity_sigma, usual2) + sigma_v * sigma_v;
     const double entering = std::clamp(1.0 - (phase - config_.entry_delay) / entry_time, 0.0, 1.0);
-    // As much as the noise across on all three axes is no motion.
+    // As much as the noise across on all three axes, and as supporting soles usually seem to move, is no motion.
     const double loose = 1.0 + std::max(0.0, moving2 / noise2 - 3.0) + (loosest - 1) * entering;
     foot.variance_scale = std::min(loose / std::max(0.01, contacts.probability[side]), loosest * loosest);
   }
