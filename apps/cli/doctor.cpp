@@ -1,4 +1,5 @@
 // kilvo doctor INPUT --config FILE, kilvo calibrate INPUT --config FILE --out FILE
+#include <algorithm>
 #include <filesystem>
 #include <fmt/core.h>
 #include <fstream>
@@ -35,6 +36,8 @@ lab::RecordingOptions recording_options(const DoctorOptions& options, const lab:
   lab::RecordingOptions out;
   out.start = options.start;
   out.duration = options.duration;
+  const bool with_legs = std::ranges::find(used, Sensor::legs) != used.end();
+  if (with_legs && settings.leg_clock.clock != "stamp") out.leg_clock.emplace(settings.leg_clock, robot);
   for (const Sensor sensor : used) {
     const auto i = static_cast<std::size_t>(sensor);
     out[sensor] = {true, settings.topic(sensor), rates[i], offsets[i]};

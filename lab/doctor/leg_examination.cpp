@@ -246,10 +246,6 @@ void Examination::examine_leg_rotation() {
   }
   const double sigma = fit.offset_sigma();
   const std::string clock = fmt::format("{:.1f} ms against the IMU, standard deviation {:.1f} ms", 1e3 * fit.offset, 1e3 * sigma);
-  if (robot_.legs.clock != "stamp") {
-    check(Sensor::legs, "clock", Check::Verdict::good, clock + ": found by the estimator itself (legs.clock)");
-    return;
-  }
   if (std::abs(fit.offset) < std::max(clock_tolerance, sure * sigma) || fit.explained < 0.6) {
     check(Sensor::legs, "clock", fit.explained < 0.6 ? Check::Verdict::unknown : Check::Verdict::good, clock);
     leg_offset_ = 0;
