@@ -1,7 +1,10 @@
 // kilvo live --config FILE
+#include <atomic>
 #include <fmt/core.h>
+#include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/interrupt.hpp"
@@ -9,13 +12,14 @@
 #ifdef KILVO_WITH_DDS
 #include "apps/dds/live.hpp"
 #include "apps/node/node.hpp"
+#include "lab/recordings/message_log.hpp"
 #endif
 
 namespace kilvo::cli {
 namespace {
 
 struct LiveWords {
-  std::string config, interface;
+  std::string config, interface, record;
   int domain = 0;
   std::vector<std::string> peers, overrides;
   bool no_deskew = false;
@@ -36,6 +40,37 @@ node::Options options_of(const LiveWords& words, const lab::LiveConfig& live) {
   return out;
 }
 
+/// All that is published, as a log. A disk that is full ends the log, not the run.
+class Record {
+ public:
+  Record(const std::string& file, std::string node, std::function<void(const std::string&)> say)
+      : log_(file), node_(std::move(node)), say_(std::move(say)) {}
+
+  node::Outlet outlet() {
+    return {lab::Encoding::cdr, [this](node::Topic) { return !ended_; },
+            [this](node::Topic topic, Time stamp, const std::vector<std::uint8_t>& bytes) { write(topic, stamp, bytes); }};
+  }
+  void close() {
+    if (!ended_) log_.close();
+  }
+
+ private:
+  void write(node::Topic topic, Time stamp, const std::vector<std::uint8_t>& bytes) {
+    const node::TopicFacts& facts = node::facts_of(topic);
+    const std::string name = facts.name;
+    try {
+      log_.write(name.starts_with('/') ? name : "/" + node_ + "/" + name, facts.type, stamp, bytes);
+    } catch (const lab::OutputError& error) {
+      if (!ended_.exchange(true)) say_(fmt::format("the record ends here: {}", error.what()));
+    }
+  }
+
+  lab::MessageLog log_;
+  std::string node_;
+  std::function<void(const std::string&)> say_;
+  std::atomic<bool> ended_{false};
+};
+
 int live(const LiveWords& words) {
   InterruptWatch interrupt;  // before any thread
   const lab::Settings settings = node::load_settings(words.config, words.overrides);
@@ -45,12 +80,16 @@ int live(const LiveWords& words) {
     fmt::print(stderr, "kilvo: {}\n", text);
   };
   dds::LiveOptions options{{words.domain, words.interface, words.peers}, options_of(words, settings.live), settings.live.name};
+  std::optional<Record> record;
+  std::optional<node::Outlet> log;
+  if (!words.record.empty()) log = record.emplace(words.record, settings.live.name, say).outlet();
+  const auto is_over = [&interrupt] { return interrupt.requested(); };
   try {
-    dds::run_live(
-        options, settings, [&interrupt] { return interrupt.requested(); }, say);
+    dds::run_live(options, settings, is_over, say, log ? &*log : nullptr);
   } catch (const dds::DdsError& error) {
     throw UsageError(fmt::format("live: {}", error.what()));
   }
+  if (record) record->close();
   return done;
 }
 
@@ -77,6 +116,7 @@ void add_live(CLI::App& program, Action& chosen) {
   verb->add_option("--peer", words->peers, "address to look for others at, instead of by multicast; repeatable")
       ->type_name("ADDRESS")
       ->allow_extra_args(false);
+  verb->add_option("--record", words->record, "keep all that is published as a log in MCAP, which Foxglove opens")->type_name("FILE");
   verb->add_option("--set", words->overrides, "override one setting, repeatable (lidar.voxel_size=0.2)")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
