@@ -22,7 +22,7 @@ struct RunOptions {
   double duration = std::numeric_limits<double>::infinity();  // s
   std::optional<std::filesystem::path> map;                   // out/map.ply by default
   bool with_map = true;
-  bool mcap = false;  // out/run.mcap too
+  bool mcap = false;               // out/run.mcap too
   std::optional<double> realtime;  // through the live runner, so many times as fast as it was recorded
   bool no_deskew = false;
   int threads = 1;  // more than one: reading and the map have their own. The results are the same

@@ -50,7 +50,7 @@ struct MountFit {
 /// Refines both from a start within some degrees and 20 ms or so.
 MountFit fit_mount(const std::vector<Turn>& turns, const GyroPath& gyro, const SO3& R, double offset, double rotation_prior = INFINITY);
 
-/// The half of the intervals that a fit explains best: where a foot that is said to stand does not roll.
+/// The half of the intervals that a fit explains best: where a foot that is reported to stand does not roll.
 std::vector<Turn> best_half(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& fit);
 
 /// Seconds of a block in whose scatter uncertainties are counted.

@@ -18,10 +18,10 @@ bool is_type_of(Sensor sensor, std::string_view type);
 std::vector<Sensor> sensors_of_type(std::string_view type);
 
 struct DecodedMeasurement {
-  Measurement measurement;                 // time 0 where the message has no stamp; of joints in a LowState: its tick
-  std::size_t absurd_times = 0;            // LiDAR: points dropped because of their time
+  Measurement measurement;                   // time 0 where the message has no stamp; of joints in a LowState: its tick
+  std::size_t absurd_times = 0;              // LiDAR: points dropped because of their time
   std::optional<Eigen::Vector3d> gyro = {};  // rad/s, of joints in a LowState: of the pelvis, in its axes
-  std::optional<std::uint32_t> tick = {};  // ms, wraps around: what a LowState has in place of a stamp
+  std::optional<std::uint32_t> tick = {};    // ms, wraps around: what a LowState has in place of a stamp
 };
 
 /// What a message says of one sensor; `point_time` matters for LiDAR types only. The error says why there is nothing.

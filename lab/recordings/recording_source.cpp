@@ -120,7 +120,8 @@ std::vector<std::string> RecordingSource::warnings() const {
   if (options_.leg_clock) {
     const auto& clock = *options_.leg_clock;
     const auto text = clock.offset() ? std::to_string(1e3 * *clock.offset()) + " ms to the times of arrival" : std::string("not found");
-    texts.push_back("legs: clock by comparison with the IMU: " + text + "; " + plural(clock.withheld(), "sample") + " before that not used");
+    texts.push_back("legs: clock by comparison with the IMU: " + text + "; " + plural(clock.withheld(), "sample") +
+                    " before that not used");
   }
   if (!point_time_.usual_span) texts.push_back(topic(Sensor::lidar) + ": point times in " + point_time_.text());
   if (reader_->late_messages() > 0) {

@@ -32,7 +32,7 @@ struct RecordingOptions {
   double start = 0;                                           // s from the beginning of the recording
   double duration = std::numeric_limits<double>::infinity();  // s
 
-  std::optional<LegClock> leg_clock;                          // puts the leg samples onto the IMU's clock
+  std::optional<LegClock> leg_clock;  // puts the leg samples onto the IMU's clock
 
   SensorInput& operator[](Sensor s) { return sensors[static_cast<std::size_t>(s)]; }
   const SensorInput& operator[](Sensor s) const { return sensors[static_cast<std::size_t>(s)]; }
