@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <memory>
 #include <set>
+#include <stdexcept>
 
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/sensor_choice.hpp"
@@ -49,38 +50,58 @@ void print_topics(const lab::RecordingDescription& about) {
   }
 }
 
-// The first leg message against the joints that the URDF has between the IMU and the feet.
+// Names of the joints between the IMU and the feet; none when the URDF cannot tell.
+std::set<std::string> joints_of_legs(const Robot& robot) {
+  std::set<std::string> out;
+  try {
+    const LinkTree tree(robot);
+    for (const Foot& foot : robot.feet) {
+      for (const std::string& joint : tree.chain(robot.imu.link, foot.link).names) out.insert(joint);
+    }
+  } catch (const std::invalid_argument& e) {
+    fmt::print("joints: {}\n", e.what());
+  }
+  return out;
+}
+
+// The names in that of the first leg messages which has most of them: hands and heads may be on the same topic.
+std::vector<std::string> best_names(const InfoOptions& options, lab::RecordingOptions wanted, const std::set<std::string>& joints) {
+  constexpr int patience = 20;
+  const auto found = [&](const std::vector<std::string>& names) {
+    return std::ranges::count_if(names, [&](const std::string& name) { return joints.contains(name); });
+  };
+  for (const Sensor sensor : every_sensor) wanted[sensor].use = sensor == Sensor::legs;
+  std::vector<std::string> best;
+  try {
+    lab::RecordingSource source(options.paths(), wanted);
+    for (int i = 0; i < patience;) {
+      const auto measurement = source.next();
+      if (!measurement) break;
+      const auto* sample = std::get_if<JointSample>(&*measurement);
+      if (sample == nullptr) continue;
+      if (best.empty() || found(sample->names) > found(best)) best = sample->names;
+      ++i;
+    }
+  } catch (const lab::InputError&) {  // the table says that there is no such topic
+  }
+  return best;
+}
+
+// The leg messages against the joints that the URDF has between the IMU and the feet.
 void print_joints(const InfoOptions& options, const lab::Settings& settings, const lab::RecordingOptions& wanted) {
   const Robot& robot = settings.robot;
   if (!settings.has(Sensor::legs) || robot.legs.type != "joints" || robot.urdf.empty() || robot.imu.link.empty()) return;
-  lab::RecordingOptions only_legs = wanted;
-  for (const Sensor sensor : every_sensor) only_legs[sensor].use = sensor == Sensor::legs;
-  std::optional<JointSample> first;
-  try {
-    lab::RecordingSource source(options.paths(), only_legs);
-    while (auto measurement = source.next()) {
-      if (const auto* sample = std::get_if<JointSample>(&*measurement)) {
-        first = *sample;
-        break;
-      }
-    }
-  } catch (const lab::InputError&) {
-    return;  // the table above says that there is no such topic
-  }
-  if (!first) return;
-  const LinkTree tree(robot);
-  std::set<std::string> needed, missing;
-  for (const Foot& foot : robot.feet) {
-    for (const std::string& joint : tree.chain(robot.imu.link, foot.link).names) needed.insert(joint);
-  }
+  const std::set<std::string> needed = joints_of_legs(robot);
+  const std::vector<std::string> names = best_names(options, wanted, needed);
+  if (needed.empty() || names.empty()) return;
+  std::vector<std::string> missing;
   for (const std::string& joint : needed) {
-    if (std::ranges::find(first->names, joint) == first->names.end()) missing.insert(joint);
+    if (std::ranges::find(names, joint) == names.end()) missing.push_back(joint);
   }
   fmt::print("joints: {} of the {} between {} and the feet in {} are in {}\n", needed.size() - missing.size(), needed.size(),
              robot.imu.link, settings.urdf_file, settings.topic(Sensor::legs));
   for (const std::string& joint : missing)
-    fmt::print("  {} is not in the messages, nearest is {}; robot.locked_joints if it does not move\n", joint,
-               lab::nearest(joint, first->names));
+    fmt::print("  {} is not in the messages, nearest is {}; robot.locked_joints if it does not move\n", joint, lab::nearest(joint, names));
 }
 
 int info(const InfoOptions& options) {
