@@ -58,6 +58,7 @@ def description_cases(config, folder, work):
             out.append((f"LiDAR {name}", texts(key, R @ rotation(axis, degrees)), ["lidar_rotation"]))
         if np.linalg.norm(R.T @ R.T - np.eye(3)) > 1e-6 or np.linalg.norm(p) > 0.03:
             out.append(("LiDAR inverted", texts(key, R.T, -R.T @ p), ["lidar_inverted", "lidar_position"]))
+        out.append(("LiDAR yawed by 180", texts(key, R @ rotation("z", 180)), ["lidar_rotation"]))
         out.append(("LiDAR moved by 10 cm", texts(key, p=p + [0.1, 0, 0]), ["lidar_position"]))
         out.append(("LiDAR moved by 10 cm up", texts(key, p=p + [0, 0, -0.1]), ["lidar_position"]))
         out.append(("LiDAR position in mm", texts(key, p=1000 * p), ["lidar_position", "lidar_unit"]))
@@ -71,6 +72,7 @@ def description_cases(config, folder, work):
             out.append((f"legs' clock {ms} ms", [f"legs.time_offset={ms / 1000}"], ["legs_clock"]))
         out.append(("IMU turned by 5 on its link", texts(key, rotation("y", 5) @ R), ["imu_mount_rotation"]))
         out.append(("IMU turned by 90 on its link", texts(key, rotation("z", 90) @ R), ["imu_mount_rotation"]))
+        out.append(("IMU's mount inverted", texts(key, R.T, -R.T @ p), ["imu_mount_rotation", "imu_mount_position", "imu_link"]))
         out.append(("IMU on another link", ["imu.T_link_imu.link=" + ("left_hip_pitch_link" if "ankle" in str(config["robot"]) else "l_hip_1")], ["imu_link", "imu_mount_rotation"]))
         feet = config["robot"]["feet"]
         swapped = [dict(feet[0], link=feet[1]["link"]), dict(feet[1], link=feet[0]["link"])]
@@ -100,6 +102,7 @@ def description_cases(config, folder, work):
         out.append(("camera in the body frame", texts(key, R @ optical.T), ["camera_frame", "camera_rotation"]))
         out.append(("camera inverted", texts(key, R.T, -R.T @ p), ["camera_inverted", "camera_rotation"]))
         out.append(("camera turned by 5", texts(key, R @ rotation("x", 5)), ["camera_rotation"]))
+        out.append(("camera upside down", texts(key, R @ rotation("z", 180)), ["camera_rotation"]))
         out.append(("camera's fx halved", [f"camera.fx={config['camera']['fx'] / 2}"], ["camera_focal"]))
         out.append(("camera's fx and fy halved", [f"camera.fx={config['camera']['fx'] / 2}", f"camera.fy={config['camera']['fy'] / 2}"], ["camera_focal"]))
         out.append(("camera's cx and cy swapped", [f"camera.cx={config['camera']['cy']}", f"camera.cy={config['camera']['cx']}"], ["camera_principal_point"]))
@@ -143,6 +146,10 @@ def shift(m):
     m.name = m.name[1:] + m.name[:1]
 
 
+def exchange_ankles(m):
+    m.name = [n.replace("ankle_pitch", "#").replace("ankle_roll", "ankle_pitch").replace("#", "ankle_roll") for n in m.name]
+
+
 def in_degrees(m):
     m.position = [math.degrees(q) for q in m.position]
     m.velocity = [math.degrees(q) for q in m.velocity]
@@ -178,7 +185,8 @@ def data_cases(config):
            ("accelerometer's signs flipped", each_imu(lambda w, a: (w, -a)), ["imu_axes"])]
     if "legs" in config:
         out += [("joints in degrees", each_legs(in_degrees), ["joint_unit"]), ("left and right swapped", each_legs(swap_sides), ["joints_swapped"]),
-                ("names shifted by one", each_legs(shift), ["joint_names_shifted"])]
+                ("names shifted by one", each_legs(shift), ["joint_names_shifted"]),
+                ("ankles exchanged", each_legs(exchange_ankles), ["joints_exchanged"])]
     if "lidar" in config:
         out += [("point times reversed", reversed_times, ["point_times_reversed"]), ("point times absent", no_times, ["point_times_absent"])]
     return out

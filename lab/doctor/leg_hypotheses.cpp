@@ -61,6 +61,32 @@ LegHypothesis shifted(const std::vector<std::size_t>& joints, int by) {
   return h;
 }
 
+// Two neighbours exchanged in each leg.
+std::vector<LegHypothesis> exchanges(const std::vector<std::size_t>& joints, const std::vector<std::string>& names) {
+  std::vector<LegHypothesis> out;
+  for (std::size_t k = 0; k + 1 < joints.size(); ++k) {
+    const std::string a = names[joints[k]], b = names[joints[k + 1]];
+    const std::string other_a = other_side(a), other_b = other_side(b);
+    // Each pair once, by its first leg.
+    if (other_a == b || (has_side(a) && std::ranges::find(names, other_a) < std::ranges::find(names, a))) continue;
+    LegHypothesis h;
+    h.cause = "joints_exchanged";
+    h.name = fmt::format("the joints {} and {} are exchanged in the messages, in both legs", a, b);
+    h.setting = "the driver must publish each position under its own joint's name";
+    h.names = [a, b, other_a, other_b](std::vector<std::string>& all) {
+      for (std::string& name : all) {
+        if (name == a || name == b) {
+          name = name == a ? b : a;
+        } else if (name == other_a || name == other_b) {
+          name = name == other_a ? other_b : other_a;
+        }
+      }
+    };
+    out.push_back(h);
+  }
+  return out;
+}
+
 }  // namespace
 
 LegHypothesis degrees_hypothesis() {
@@ -113,6 +139,7 @@ std::vector<LegHypothesis> leg_hypotheses(const Recorded& recorded, const Robot&
     out.push_back(shifted(joints, by));
     if (joints.size() != every.size()) out.push_back(shifted(every, by));
   }
+  for (LegHypothesis& h : exchanges(joints, names)) out.push_back(std::move(h));
   for (const std::string& link : link_names(robot.urdf)) {
     if (link == robot.imu.link || has_side(link)) continue;
     LegHypothesis h;
