@@ -50,7 +50,8 @@ void ContactDetector::adapt(LegStep& step, const State& x, const Eigen::Vector3d
   if (paper == nullptr) return;
   for (std::size_t side = 0; side < 2; ++side) {
     Stance& foot = step.foot[side];
-    if (!foot.used) continue;
+    // A foot that carries though it is not believed to, because no other does, keeps its wide noise.
+    if (!foot.used || !paper->contacts().on[side]) continue;
     const Eigen::Vector3d pc = foot.begins ? x.pose() * foot.point.p : Eigen::Vector3d(x.pc[side] + x.R * foot.shift);
     const auto r = residual_of(foot, paper->contacts().ground[side], x, pc, gyro);
     paper->learn(side, r);

@@ -149,6 +149,7 @@ const Contacts& PaperContactEstimator::update(const Feet& feet, const State& x, 
     motion[side] = {velocity_W(x, low.p, low.v, omega), x.pose() * low.p};
   }
   contacts_.t = feet.t;
+  contacts_.normal = -x.g.normalized();
   if (!started_) start(feet, x, motion);
   const bool still = record_still_start(feet.t, accel, motion);
   record_first_swing(accel, motion);
@@ -163,6 +164,7 @@ const Contacts& PaperContactEstimator::update(const Feet& feet, const State& x, 
     contacts_.d_fv[side] = d_fv;
     f.clearances.add(feet.t, f.ground.height_of(m.lowest));  // Eq. 18
     contacts_.clearance[side] = f.ground.height_of(m.lowest);
+    contacts_.ground[side] = f.ground;
     if (still) continue;
     if (contacts_.on[side]) {
       f.settled = f.settled || f.calm.update(contacts_.d_a < theta_d, feet.t) || !initialised();

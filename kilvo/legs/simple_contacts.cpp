@@ -21,11 +21,13 @@ constexpr double least_variance = 0.05;
 bool ContactReport::begin(const Feet& feet, const State& x) {
   const Eigen::Vector3d up_W = -x.g.normalized(), up_I = x.R.matrix().transpose() * up_W;
   contacts_.t = feet.t;
+  contacts_.normal = up_W;
   for (std::size_t side = 0; side < 2; ++side) lowest_[side] = x.pose() * lowest_point(feet.foot[side], up_I).p;
   const bool first = !started_;
   started_ = true;
   if (first) {
     contacts_.on = {true, true};
+    contacts_.probability = {1, 1};
     contacts_.since = {feet.t, feet.t};
   }
   for (std::size_t side = 0; side < 2; ++side) {
@@ -38,6 +40,7 @@ bool ContactReport::begin(const Feet& feet, const State& x) {
 void ContactReport::set(std::size_t side, bool on) {
   if (contacts_.on[side] == on) return;
   contacts_.on[side] = on;
+  contacts_.probability[side] = on ? 1 : 0;
   contacts_.since[side] = contacts_.t;
 }
 
