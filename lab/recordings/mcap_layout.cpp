@@ -29,6 +29,8 @@ class McapWalk {
     index_is_doubtful_ = !closed_ && !in_summary_;
     finish_chunk();
     if (layout_.damages.empty() && !closed_) note({file_.size(), "the file was never closed"});
+    const auto chunks = std::ranges::count(layout_.chunks, true, &McapChunk::is_chunk);
+    if (layout_.damages.empty() && chunks < chunk_indexes_) note({file_.size(), "the index names chunks that are not there"});
     (summary_is_sound_ ? layout_.channels : layout_.doubtful).add(summary_);
     return std::move(layout_);
   }
@@ -72,6 +74,9 @@ class McapWalk {
         return take_index(record);
       case McapOp::header:
         layout_.profile = ByteReader(view(record)).string();
+        return true;
+      case McapOp::chunk_index:
+        ++chunk_indexes_;
         return true;
       case McapOp::data_end:
         finish_chunk();
@@ -258,6 +263,7 @@ class McapWalk {
   bool index_is_doubtful_ = false;
   bool resynced_ = false;
   std::map<std::uint16_t, TimesSummary> index_;  // of the last chunk
+  std::ptrdiff_t chunk_indexes_ = 0;
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
 #include "lab/recordings/sqlite_file.hpp"
 
-#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstring>
 
@@ -45,7 +45,7 @@ struct SqliteFile::Access {
     methods.xTruncate = [](sqlite3_file*, sqlite3_int64) { return SQLITE_READONLY; };
     methods.xSync = [](sqlite3_file*, int) { return SQLITE_OK; };
     methods.xFileSize = [](sqlite3_file* handle, sqlite3_int64* size) {
-      *size = static_cast<sqlite3_int64>(reinterpret_cast<Handle*>(handle)->access->file.size());
+      *size = static_cast<sqlite3_int64>(reinterpret_cast<Handle*>(handle)->access->whole_pages());
       return SQLITE_OK;
     };
     methods.xLock = methods.xUnlock = [](sqlite3_file*, int) { return SQLITE_OK; };
@@ -75,6 +75,14 @@ struct SqliteFile::Access {
     if (got == size) return SQLITE_OK;
     std::memset(static_cast<std::uint8_t*>(to) + got, 0, size - got);
     return SQLITE_IOERR_SHORT_READ;
+  }
+
+  /// The size of the file without a page that its end has cut: half a page would read as one with zeros in it.
+  std::uint64_t whole_pages() const {
+    std::array<std::uint8_t, 18> header{};
+    if (file.read_at(0, header) < header.size()) return file.size();
+    const std::uint64_t page = header[16] == 0 && header[17] == 1 ? 65536 : 256U * header[16] + header[17];
+    return page < 512 ? file.size() : file.size() / page * page;
   }
 
   const FileBytes& file;
