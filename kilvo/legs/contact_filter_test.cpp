@@ -68,7 +68,7 @@ TEST(ContactFilter, LearnsRobotsWhoseSolesNeverSeemToStandStill) {
 }
 
 TEST(ContactFilter, OneWildSampleDecidesNothing) {
-  for (const double dt : {0.0005, 0.001, 0.005}) {
+  for (const double dt : {0.0005, 0.001, 0.002}) {
     ContactFilter filter;
     ContactCues cues;
     cues.dt = dt;
@@ -125,29 +125,38 @@ TEST(ContactFilter, ProbabilitiesAddUpToOneWhateverTheCuesAre) {
   }
 }
 
-TEST(ContactFilter, ImpactsThatComeWithTouchdownsBringThemForward) {
-  for (const bool with_impacts : {false, true}) {
-    test::Random random(3);
-    const Walk walk;
-    ContactFilter filter;
-    double late = 0, touchdowns = 0, came = 0;
-    bool stood = true, found = true;
-    for (double s = -1; s < 20; s += 0.001) {
-      ContactCues cues = walk.cues(random, s, 0.001);
-      const bool stands = Walk::stands(0, s);
-      if (stands && !stood) came = s, found = false;
-      cues.impact[0] = with_impacts && stands && s - came < 0.004;
-      filter.update(cues);
-      if (!found && filter.carries(0) > 0.5) {
-        found = true;
-        if (s > 8) late += s - came, ++touchdowns;
-      }
-      stood = stands;
+// How late the left foot's touchdowns are found once the robot is known, s.
+double lateness(bool with_impacts) {
+  test::Random random(3);
+  Walk walk;
+  walk.spread = 1;
+  walk.height_noise = 0.02;
+  ContactFilter filter;
+  double late = 0, touchdowns = 0, came = 0;
+  bool stood = true, found = true;
+  for (double s = -1; s < 30; s += 0.001) {
+    ContactCues cues = walk.cues(random, s, 0.001);
+    const bool stands = Walk::stands(0, s);
+    if (stands && !stood) {
+      came = s;
+      found = false;
     }
-    ASSERT_GE(touchdowns, 10);
-    EXPECT_EQ(late / touchdowns < 0.004, with_impacts) << late / touchdowns;
+    cues.impact[0] = with_impacts && stands && s - came < 0.004;
+    filter.update(cues);
+    if (!found && filter.carries(0) > 0.5) {
+      found = true;
+      if (s > 8) {
+        late += s - came;
+        ++touchdowns;
+      }
+    }
+    stood = stands;
   }
+  EXPECT_GE(touchdowns, 20);
+  return late / touchdowns;
 }
+
+TEST(ContactFilter, ImpactsThatComeWithTouchdownsBringThemForward) { EXPECT_LT(lateness(true), 0.8 * lateness(false)); }
 
 }  // namespace
 }  // namespace kilvo

