@@ -7,12 +7,13 @@
 #   make bench      time the functions; RECORDINGS=DIR: time and judge whole recordings as well
 #   make tables     RECORDINGS=DIR: every modality on every recording, as Markdown
 #   make check      layout, modules, sizes, headers, clang-tidy (files that changed since they last passed; ALL=1: every file)
+#   make golden     seventy runs must give the bytes of tests/golden/manifest.json (a refactoring changes none)
 #   make format     rewrite the sources in the one layout
 #   make fuzz       fuzz the readers, SECONDS_EACH=60 each
 #   make install    into PREFIX=/usr/local
 #   make package    Debian packages in build/package
 #   make clean      remove build/
-.PHONY: build demo test test-asan test-tsan bench tables check format fuzz install package clean dependencies-run dependencies dependencies-dev configure configure-program
+.PHONY: build demo test test-asan test-tsan bench tables golden check format fuzz install package clean dependencies-run dependencies dependencies-dev configure configure-program
 .NOTPARALLEL:
 .DEFAULT_GOAL := build
 
@@ -71,6 +72,10 @@ endif
 
 tables: build
 	@bench/macro/tables --kilvo $(KILVO) $(or $(RECORDINGS),$(error RECORDINGS=DIR says where the recordings are))
+
+golden: configure-program
+	@cmake --build --preset release --target kilvo_cli
+	@scripts/golden --kilvo $(KILVO)
 
 check: dependencies-dev configure
 	@scripts/check_modules

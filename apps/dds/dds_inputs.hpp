@@ -37,7 +37,7 @@ class DdsInputs {
     bool is_compressed = false;
     bool is_quick = false;
     std::list<Reader> readers;
-    std::map<std::vector<std::uint8_t>, std::string> misfits;  // of publishers that are there: why they cannot be heard
+    std::map<std::string, std::string> misfits;  // of publishers that are there: why they cannot be heard
   };
   struct Publisher;  // as discovery describes it
 
