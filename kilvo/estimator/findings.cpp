@@ -78,6 +78,9 @@ void Estimator::report_streams() {
     if (stream.messages > few && stream.mean_lag > late) events_.state({now(), sensor, Reason::lagging, stream.mean_lag, 1, {}});
     if (stream.frozen > 0) events_.state({now(), sensor, Reason::froze, 0, stream.frozen, {}});
   }
+  constexpr double far_more = 10;
+  if (const double noise = replay_.accel_noise(); noise > far_more * config_.noise.accel)
+    events_.state({now(), Sensor::imu, Reason::noisy_accel, noise, 1, {}});
   if (events_.all() != statistics_.events) statistics_.events = events_.all();
 }
 

@@ -33,6 +33,9 @@ class Replay {
   /// What the IMU said at `t`: between two samples, or the last one held.
   ImuSample imu_at(Time t) const;
 
+  /// Density of the accelerometer's noise as it is taken, m/s^2/sqrt(Hz): that of the settings, or more when the samples show it.
+  double accel_noise() const { return noise_now().accel; }
+
   bool has_imu() const { return !imu_.empty(); }
   const ImuSample& newest_imu() const { return imu_.back(); }
   /// The stamp of the newest IMU sample that is not after t; before all times when there is none.
