@@ -114,6 +114,17 @@ bool parse_line(std::string_view line, const std::string& package, SchemaType& t
   return true;
 }
 
+/// ROS 2 allows small letters only; of the types of both, CameraInfo alone has others in ROS 1.
+std::string field_name_in(Encoding encoding, std::string_view type, std::string name) {
+  constexpr std::string_view matrices = "dkrp";
+  if (encoding == Encoding::cdr) {
+    for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  } else if (type == "sensor_msgs/CameraInfo" && name.size() == 1 && matrices.find(name) != std::string_view::npos) {
+    name[0] = static_cast<char>(name[0] - 'a' + 'A');
+  }
+  return name;
+}
+
 /// "[]", "[3]" or nothing.
 std::string length_of(const SchemaField& field) {
   if (field.array == Array::none) return {};
@@ -183,7 +194,7 @@ std::string MessageSchema::text(Encoding encoding) const {
     if (&type != &types_.front()) out += line + "\nMSG: " + type.name + "\n";
     for (const std::string& constant : type.constants) out += constant + "\n";
     for (const SchemaField& field : type.fields) {
-      out += name_in(field) + length_of(field) + " " + field.name + "\n";
+      out += name_in(field) + length_of(field) + " " + field_name_in(encoding, type.name, field.name) + "\n";
     }
   }
   if (any_header)
@@ -209,7 +220,7 @@ std::string MessageSchema::md5_of(std::size_t index) const {
       text += (field.kind == Kind::header ? std::string(header) : md5_of(field.type)) + " " + field.name + "\n";
       continue;
     }
-    text += field.type_name + length_of(field) + " " + field.name + "\n";
+    text += field.type_name + length_of(field) + " " + field_name_in(Encoding::ros1, types_[index].name, field.name) + "\n";
   }
   if (!text.empty()) text.pop_back();
   std::array<char, MD5_DIGEST_STRING_LENGTH> sum{};

@@ -73,6 +73,14 @@ TEST(MessageSchema, TheTextOfOneIsUnderstoodAsTheOther) {
   EXPECT_EQ(ros2->text(Encoding::ros1), ros1.text(Encoding::ros1));
 }
 
+TEST(MessageSchema, MatricesOfACameraHaveSmallNamesInRos2) {
+  const auto schema = MessageSchema::parse("sensor_msgs/CameraInfo", "float64[] D\nfloat64[9] K\nuint32 binning_x\n");
+  ASSERT_TRUE(schema) << schema.reason();
+  EXPECT_EQ(schema->text(Encoding::cdr), "float64[] d\nfloat64[9] k\nuint32 binning_x\n");
+  const auto back = MessageSchema::parse("sensor_msgs/CameraInfo", schema->text(Encoding::cdr));
+  EXPECT_EQ(back->md5(), schema->md5());
+}
+
 TEST(MessageSchema, UnderstandsWhatRos2MayWrite) {
   const auto schema = MessageSchema::parse("a/B",
                                            "# a comment\nstring<=10 name \"x # y\"  # another\nint32[<=3] some\nfloat64[2] two [1.0, 2.0]\n"
