@@ -5,6 +5,7 @@ import argparse
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -48,11 +49,15 @@ class Story:
         self.folder, self.domain = folder, str(random.SystemRandom().randrange(20, 200))
         self.walk = os.path.join(folder, "walk")
         run(ARGUMENTS.kilvo, "simulate", "room", "--seed", "3", "--duration", str(SECONDS), "--out", self.walk, "--quiet")
-        self.bag, self.config = os.path.join(self.walk, "recording.bag"), os.path.join(self.walk, "config.yaml")
+        self.bag, self.config = os.path.join(self.walk, "recording.bag"), os.path.join(self.walk, "no_camera.yaml")
+        with open(os.path.join(self.walk, "config.yaml"), encoding="utf-8") as file:
+            text = re.sub(r"^camera:\n(?:[ #].*\n|\n)*", "", file.read(), flags=re.M)
+        with open(self.config, "w", encoding="utf-8") as file:
+            file.write(text)
 
     def live(self, *more: str) -> Program:
         live = Program(ARGUMENTS.kilvo, "live", "--config", self.config, "--domain", self.domain, "--peer", "127.0.0.1", "--interface", "lo",
-                       "--set", "camera.topic=''", "--set", f"live.map_file={self.folder}/map.ply", *more)
+                       "--set", f"live.map_file={self.folder}/map.ply", *more)
         if not wait_until(lambda: "odometry of" in live.said()):
             raise AssertionError(live.said())
         return live
