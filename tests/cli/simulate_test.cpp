@@ -166,7 +166,7 @@ TEST(Simulate, TheRecordingInTheFolderUsesTheConfigurationBesideIt) {
   const Finished info = kilvo({"info", folder / "sim/recording.bag"});
   EXPECT_EQ(info.code, 0) << info.err;
   EXPECT_THAT(info.out,
-              AllOf(HasSubstr("use: with " + (folder / "sim/config.yaml")), HasSubstr("joints: 15 of the 15 between torso_link")));
+              AllOf(HasSubstr("use: with " + (folder / "sim/config.yaml")), HasSubstr("joints: 13 of the 13 between torso_link")));
 }
 
 TEST(Simulate, TheSameSeedGivesTheSameBytes) {
