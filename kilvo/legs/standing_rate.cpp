@@ -11,6 +11,8 @@ constexpr double longest_gap = 0.05;  // s, between samples
 // No window says more than this, rad/s: the soles give way, and the next windows say the same.
 constexpr double least_sigma = 3e-4;
 constexpr double shortest_correlation = 0.01;  // s, of the gyro's noise while the robot stands
+// What says less is sway, which is not as white as it is taken: not used, rad/s.
+constexpr double largest_sigma = 1e-3;
 
 }  // namespace
 
@@ -49,6 +51,7 @@ std::optional<GyroBiasReading> StandingRate::add(const Feet& feet, const Contact
   out.sigma = std::sqrt(least_sigma * least_sigma + 0.25 * (seen[0] - seen[1]).squaredNorm() + turn * turn +
                         variance.maxCoeff() * shortest_correlation / time);
   begin(feet);
+  if (out.sigma > largest_sigma) return std::nullopt;
   return out;
 }
 

@@ -27,22 +27,24 @@ std::optional<GyroBiasReading> read(const Eigen::Vector3d& rate, const Eigen::Ve
 
 TEST(StandingRate, WhatTheGyroSaysBeyondTheTurnOfBothSolesIsItsBias) {
   const Eigen::Vector3d bias(0.002, -0.001, 0.003);
-  for (const Eigen::Vector3d& rate : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.05, -0.1, 0.2)}) {
+  for (const Eigen::Vector3d& rate : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(2e-4, -3e-4, 4e-4)}) {
     const auto reading = read(rate, bias, 0);
     ASSERT_TRUE(reading);
     EXPECT_LT((reading->bias - bias).norm(), 1e-9);
     EXPECT_LT(reading->sigma, 5e-4 + rate.norm()) << "a turn may be hidden in part";
   }
+  EXPECT_FALSE(read({0.05, -0.1, 0.2}, bias, 0)) << "who turns is not at rest";
 }
 
 TEST(StandingRate, SolesThatDoNotAgreeSayLittle) {
-  const auto reading = read({0, 0, 0.2}, Eigen::Vector3d::Zero(), 0.02);
+  EXPECT_FALSE(read(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0.02));
+  const auto reading = read(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), 0.0012);
   ASSERT_TRUE(reading);
   EXPECT_LT(reading->bias.norm(), 3 * reading->sigma);
-  EXPECT_GT(reading->sigma, 0.005);
+  EXPECT_GT(reading->sigma, 5e-4);
 }
 
-TEST(StandingRate, FeetThatArePointsSayNothingOfTheTurn) { EXPECT_FALSE(read({0, 0, 0.1}, Eigen::Vector3d::Zero(), 0, 1)); }
+TEST(StandingRate, FeetThatArePointsSayNothingOfTheTurn) { EXPECT_FALSE(read({0, 0, 0}, Eigen::Vector3d::Zero(), 0, 1)); }
 
 }  // namespace
 }  // namespace kilvo
