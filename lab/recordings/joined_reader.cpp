@@ -25,7 +25,8 @@ JoinedReader::JoinedReader(std::string name, std::vector<std::unique_ptr<Recordi
 
 /// A topic of the same type and encoding is the same channel in every part.
 void JoinedReader::add_channels(Part& part) {
-  for (const auto& [id, channel] : part.reader->connections()) {
+  for (const auto& [id, theirs] : part.reader->connections()) {
+    const Channel& channel = theirs;
     auto known = std::ranges::find_if(connections_, [&](const auto& entry) {
       const Channel& c = entry.second;
       return c.topic == channel.topic && c.type == channel.type && c.encoding == channel.encoding;

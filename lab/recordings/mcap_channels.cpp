@@ -41,9 +41,16 @@ Channel McapChannels::channel(const McapChannel& from) const {
   return channel;
 }
 
-std::map<std::uint32_t, Channel> McapChannels::all() const {
+bool McapChannels::has(std::uint16_t channel) const {
+  const auto found = channels_.find(channel);
+  return found != channels_.end() && (found->second.schema == 0 || schemas_.contains(found->second.schema));
+}
+
+std::map<std::uint32_t, Channel> McapChannels::all(bool with_schema) const {
   std::map<std::uint32_t, Channel> all;
-  for (const auto& [id, from] : channels_) all.emplace(id, channel(from));
+  for (const auto& [id, from] : channels_) {
+    if (has(id) == with_schema) all.emplace(id, channel(from));
+  }
   return all;
 }
 

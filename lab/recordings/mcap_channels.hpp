@@ -15,8 +15,10 @@ class McapChannels {
   void add(const McapChannels& others);
   void add_schemas(const McapChannels& others);
   Encoding encoding(std::uint16_t channel) const;
-  bool has(std::uint16_t channel) const { return channels_.contains(channel); }
-  std::map<std::uint32_t, Channel> all() const;
+  /// It and its schema, if it has one, are known. (A summary may repeat channels without their schemas.)
+  bool has(std::uint16_t channel) const;
+  /// Those that are known with their schemas, or the others.
+  std::map<std::uint32_t, Channel> all(bool with_schema = true) const;
   Channel channel(const McapChannel& channel) const;
 
  private:

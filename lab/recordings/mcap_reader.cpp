@@ -6,14 +6,12 @@ McapReader::McapReader(FileBytes bytes) : ChunkedReader(std::move(bytes)) {
   McapLayout layout = read_mcap_layout(file());
   chunks_ = std::move(layout.chunks);
   Found found;
-  McapChannels known = layout.channels;
+  std::set<std::uint16_t> defined;
   for (const McapChunk& chunk : chunks_) {
     const std::uint64_t memory = chunk.is_chunk ? chunk.inflated_size : chunk.data_size;
     ChunkSpan span{chunk.first, chunk.last, chunk.data_size, memory, chunk.indexed, false};
     for (const std::uint16_t channel : chunk.channels) {
-      if (known.has(channel)) continue;
-      span.new_connections = true;
-      known.add(McapChannel{channel, 0, {}, {}});
+      if (!layout.channels.has(channel)) span.new_connections |= defined.insert(channel).second;
     }
     found.spans.push_back(span);
   }
@@ -21,6 +19,8 @@ McapReader::McapReader(FileBytes bytes) : ChunkedReader(std::move(bytes)) {
   found.damages = std::move(layout.damages);
   found.before = layout.channels.all();
   found.after = layout.doubtful.all();
+  found.after.merge(layout.doubtful.all(false));
+  found.after.merge(layout.channels.all(false));
   channels_ = std::make_unique<McapChannels>(std::move(layout.channels));
   channels_->add_schemas(layout.doubtful);
   start(std::move(found));
