@@ -9,8 +9,10 @@ namespace {
 
 QosChoice choice_of(node::Topic topic, const DdsType& type) {
   QosChoice out{.is_reliable = true, .depth = 10, .user_data = fmt::format("typehash=RIHS01_{};", type.ros_hash)};
-  if (topic == node::Topic::transforms) out.depth = 100;
-  if (topic == node::Topic::path) {
+  using enum node::Topic;
+  // A tenth of a second of the fast ones, so that a reader that is busy for some milliseconds misses none.
+  if (topic == transforms || topic == odometry || topic == smooth || topic == contacts) out.depth = 100;
+  if (topic == path) {
     out.depth = 1;
     out.is_kept_for_latecomers = true;
   }

@@ -1,5 +1,6 @@
 """shifted_error.py EST.tum GT.tum: the error of a trajectory whose stamps are later than the truth's by an unknown time, as JSON. That time is
-the one that leaves the least error; the world is aligned by rotation about z and translation."""
+the one that leaves the least error; the world is aligned by rotation and translation, for a live one is
+not level yet when it begins."""
 import json
 import sys
 
@@ -8,9 +9,8 @@ import numpy as np
 
 def aligned(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     a, b = a - a.mean(0), b - b.mean(0)
-    angle = np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1]).sum())
-    c, s = np.cos(angle), np.sin(angle)
-    return a @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) - b
+    u, _, vt = np.linalg.svd(a.T @ b)
+    return a @ (u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt) - b
 
 
 def error_at(shift: float, est: np.ndarray, gt: np.ndarray) -> float:
@@ -26,7 +26,7 @@ def main() -> int:
     est, gt = (np.loadtxt(path) for path in sys.argv[1:3])
     est = est[:: max(1, len(est) // 2000)]
     best = est[0, 0] - gt[0, 0]
-    for step in (0.05, 0.005, 0.0005):
+    for step in (0.05, 0.005, 0.0005, 0.0001):
         best = min((best + step * k for k in range(-40, 41)), key=lambda shift: error_at(shift, est, gt))
     print(json.dumps({"rmse": error_at(best, est, gt), "poses": len(est)}))
     return 0
