@@ -83,6 +83,7 @@ void write_corrected(const fs::path& from, const fs::path& to, const lab::Settin
   // A relative path means one from the configuration's own folder.
   const bool elsewhere = fs::weakly_canonical(fs::absolute(to)).parent_path() != fs::weakly_canonical(fs::absolute(from)).parent_path();
   if (elsewhere && settings.given.contains("robot.urdf")) text = lab::with_setting(text, "robot.urdf", settings.urdf_file);
+  while (text.ends_with('\n')) text.pop_back();  // written with one
   write_text_file(to, text);
   fmt::print(stderr, "kilvo: {} with {} setting{} changed\n", to.string(), changes, changes == 1 ? "" : "s");
 }

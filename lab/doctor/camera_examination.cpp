@@ -167,9 +167,9 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
     return;
   }
   const SO3 before = robot_.camera.T_imu_camera.R;
-  constexpr double method = 0.05, focal_method = 0.001, clock_method = 0.0002;  // degrees, of the focal length, s
+  constexpr double method = 0.3, focal_method = 0.005, clock_method = 0.0004;  // degrees, of the focal length, s
   refine_rotation(Sensor::camera, "rotation of the camera on the IMU", before, fit.R_IC, sigma, method, "camera.T_imu_camera.R");
-  Refinement r = refinement(Sensor::camera, "focal length", {fit.focal - 1}, {fit.fit.sigma(3)}, focal_method, 0.004, fmt::format("-"));
+  Refinement r = refinement(Sensor::camera, "focal length", {fit.focal - 1}, {fit.fit.sigma(3)}, focal_method, 0.01, fmt::format("-"));
   r.changes = {{"camera.fx", fmt::format("{:.3f}", fit.focal * robot_.camera.fx)},
                {"camera.fy", fmt::format("{:.3f}", fit.focal * robot_.camera.fy)}};
   refinements_.push_back(std::move(r));

@@ -83,7 +83,7 @@ void Examination::find_rotation(Finding f, const SO3& before, const SO3& after, 
 // `sigma`: rad, in the sensor's frame, in which the change is given as well; `method`: degrees that the method itself may be off by.
 void Examination::refine_rotation(Sensor sensor, const std::string& what, const SO3& described, const SO3& measured,
                                   const Eigen::Vector3d& sigma, double method, const std::string& key) {
-  constexpr double largest = 0.3;  // degrees
+  constexpr double largest = 0.5;  // degrees
   const Eigen::Vector3d turn = (described.inverse() * measured).Log();
   Refinement r = refinement(sensor, what, {degrees(turn.x()), degrees(turn.y()), degrees(turn.z())},
                             {degrees(sigma.x()), degrees(sigma.y()), degrees(sigma.z())}, method, largest, "deg");

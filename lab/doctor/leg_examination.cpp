@@ -186,7 +186,7 @@ void Examination::examine_legs() {
 bool Examination::try_leg_hypotheses() {
   const LegScore described = score_legs(nullptr, leg_offset_, false), free = score_legs(nullptr, leg_offset_, true);
   const double cost = std::min(described.cost(), free.cost());
-  constexpr double well = 0.02;  // of a description that needs no other
+  constexpr double well = 0.008;  // of a description that needs no other
   if (cost < well) return false;
   const LegHypothesis* best = nullptr;
   double least = std::min(much_better * cost, cost - well);
@@ -227,10 +227,10 @@ void Examination::examine_leg_rotation() {
   leg_offset_ = fit.offset;
   // What soles that roll and links that bend shift both by shows in what is not explained.
   const double unexplained = std::max(0.0, 1 - explained);
-  refine_rotation(Sensor::imu, "rotation of the IMU on the robot", described, fit.R, fit.rotation_sigma(), 0.05 + 10 * unexplained,
+  refine_rotation(Sensor::imu, "rotation of the IMU on the robot", described, fit.R, fit.rotation_sigma(), 0.2 + 10 * unexplained,
                   "imu.T_link_imu.R");
   refinements_.back().changes = {{"imu.T_link_imu.R", rotation_text(fit.R.inverse())}};
-  refine_offset(Sensor::legs, fit.offset, fit.offset_sigma(), 0.0004 + 0.04 * unexplained);
+  refine_offset(Sensor::legs, fit.offset, fit.offset_sigma(), 0.001 + 0.04 * unexplained);
   const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
   const double angle = degrees(turn.norm()), uncertain = degrees(fit.rotation_sigma().norm());
   const std::string detail = fmt::format("{:.1f} degrees from the description, standard deviation {:.1f}; {:.0f} % explained", angle,

@@ -134,7 +134,7 @@ void Examination::examine_lidar_rotation() {
   lidar_.offset = fit.offset;
   lidar_.error = (fit.R * described.inverse()).matrix();
   lidar_offset_ = fit.offset;
-  constexpr double method = 0.02;  // degrees
+  constexpr double method = 0.05;  // degrees: the gyro's own misalignment is taken for the mount's
   refine_rotation(Sensor::lidar, "rotation of the LiDAR on the IMU", described, fit.R, fit.rotation_sigma(), method, "lidar.T_imu_lidar.R");
   const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
   const double angle = degrees(turn.norm());
@@ -177,7 +177,7 @@ void Examination::examine_lidar_clock() {
       fit_mount(turns_of(way_), gyro(), SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix()), lidar_.offset);
   if (!fit.fit.good) return;
   const double sigma = fit.offset_sigma();
-  constexpr double method = 0.0001;  // s
+  constexpr double method = 0.00015;  // s
   refine_offset(Sensor::lidar, fit.offset, sigma, method);
   lidar_offset_ = fit.offset;
   const std::string detail = fmt::format("{:.2f} ms against the IMU, standard deviation {:.2f} ms", 1e3 * fit.offset, 1e3 * sigma);
