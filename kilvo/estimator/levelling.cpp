@@ -8,14 +8,17 @@ namespace {
 
 // Known well enough, rad; whoever waits for it does not wait for ever.
 constexpr double known = 1e-3;
-constexpr Duration longest = std::chrono::seconds(12);
+constexpr Duration longest = std::chrono::seconds(20);
 
 }  // namespace
 
 void Levelling::add(const Output& o) {
   if (R_LW_) return;
   g_ = o.x.g;
-  sigma_ = std::sqrt(std::max(0.0, o.P.diagonal().segment<3>(at::g).maxCoeff())) / std::max(1.0, g_.norm());
+  // Two directions: its length is known.
+  const double scale = 1 / std::max(1.0, g_.norm());
+  sigma_ = scale * std::sqrt(std::max(0.0, o.P.diagonal().segment<2>(at::g).maxCoeff()));
+  least_sigma_ = scale * std::sqrt(std::max(0.0, o.P.diagonal().segment<2>(at::g).minCoeff()));
   if (!first_) {
     first_ = o.t;
     first_sigma_ = sigma_;
@@ -26,7 +29,8 @@ void Levelling::add(const Output& o) {
 void Levelling::finish() {
   if (R_LW_ || !first_) return;
   R_LW_ = SO3();
-  if (!(sigma_ < 0.5 * first_sigma_) || !(g_.z() < 0)) return;
+  // Knowing one of two directions is better than none.
+  if (!(least_sigma_ < 0.5 * first_sigma_) || !(g_.z() < 0)) return;
   const Eigen::Vector3d up = -g_.normalized();
   R_LW_ = SO3::nearest(Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix());
 }

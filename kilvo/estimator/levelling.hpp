@@ -29,7 +29,7 @@ class Levelling {
   std::optional<SO3> R_LW_;
   std::optional<Time> first_;
   Eigen::Vector3d g_ = Eigen::Vector3d::Zero();
-  double sigma_ = 0, first_sigma_ = 0;  // of gravity's direction, rad
+  double sigma_ = 0, least_sigma_ = 0, first_sigma_ = 0;  // of gravity's direction, rad: of the worse axis, of the better one
 };
 
 }  // namespace kilvo

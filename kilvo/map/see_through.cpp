@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "kilvo/map/voxel_map.hpp"
 
@@ -10,8 +11,8 @@ namespace {
 
 // So many beams of a sweep are followed. A plane that so many passed through since points were found on it is gone: by level of the octree,
 // for beside an edge more beams of one sweep pass a large voxel's plane than a small one's.
-constexpr std::size_t most_beams = 128;
-constexpr std::array<float, 3> gone = {24, 10, 4};
+constexpr std::size_t most_beams = 64;
+constexpr std::array<float, 3> gone = {12, 6, 3};
 
 }  // namespace
 
@@ -20,25 +21,42 @@ void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const Poin
   for (std::size_t i = beams_of_++ % stride; i < groups.size(); i += stride) trace(origin_W, groups[i].mean);
 }
 
-// Looks at the leaves along the beam; a step is half of a leaf, so that few are missed.
+namespace {
+
+// How far along the beam it is from x until it leaves the cube of this size that x is in.
+double way_out(const Eigen::Vector3d& x, const Eigen::Vector3d& direction, double size) {
+  double way = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const double low = size * std::floor(x[i] / size);
+    if (direction[i] > 0) way = std::min(way, (low + size - x[i]) / direction[i]);
+    if (direction[i] < 0) way = std::min(way, (low - x[i]) / direction[i]);
+  }
+  return way;
+}
+
+// The beam begins clearly on one side and ends clearly on the other.
+bool passes(const Plane& plane, const Eigen::Vector3d& from, const Eigen::Vector3d& to, double clear) {
+  const double before = plane.distance(from), behind = plane.distance(to);
+  return before * behind < 0 && std::min(std::abs(before), std::abs(behind)) > clear;
+}
+
+}  // namespace
+
+// From one root voxel to the next, and from leaf to leaf only within those that hold something other than a plane that the beam does not
+// pass through.
 void VoxelMap::trace(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
-  const double length = (to - from).norm(), step = 0.5 * leaf_size();
-  if (!(length < config_.radius)) return;
-  const Eigen::Vector3d along = (step / length) * (to - from);
-  Eigen::Vector3d x = from + 2 * along;
-  Leaf last{};
-  VoxelKey key = 0;
-  std::uint32_t root = none, passed = none;
-  bool first = true;
-  for (double way = 2 * step; way + 2 * step < length; way += step, x += along) {
+  const double length = (to - from).norm(), clear = leaf_size();
+  if (!(length < config_.radius) || length < 2 * clear) return;
+  const Eigen::Vector3d direction = (to - from) / length;
+  constexpr double beyond = 1e-6;  // m: on the other side of a face
+  std::uint32_t last = none;
+  for (double way = clear; way < length - clear;) {
+    const Eigen::Vector3d x = from + way * direction;
     const Leaf leaf = leaf_of(x);
-    if (!first && leaf == last) continue;
-    const VoxelKey here = root_key(leaf);
-    if (first || here != key) root = roots_.find(here);
-    first = false;
-    key = here;
-    last = leaf;
-    if (root != none && is_passed(root, leaf, from, to, passed)) return;
+    const std::uint32_t root = roots_.find(root_key(leaf));
+    const bool empty = root == none || (nodes_[root].is_plane && !passes(nodes_[root].plane, from, to, clear));
+    if (!empty && is_passed(root, leaf, from, to, last)) return;
+    way += way_out(x, direction, empty ? config_.voxel_size : clear) + beyond;
   }
 }
 
@@ -59,9 +77,9 @@ bool VoxelMap::is_passed(std::uint32_t root, const Leaf& leaf, const Eigen::Vect
   if (plane < 0) return false;
   const std::uint32_t index = path[static_cast<std::size_t>(plane)];
   Node& node = nodes_[index];
-  // The beam begins clearly on one side, ends clearly on the other, and meets the plane within this leaf.
-  const double before = node.plane.distance(from), behind = node.plane.distance(to), clear = leaf_size();
-  if (index == last || before * behind > 0 || std::min(std::abs(before), std::abs(behind)) < clear) return false;
+  if (index == last || !passes(node.plane, from, to, leaf_size())) return false;
+  // It meets the plane within this leaf.
+  const double before = node.plane.distance(from), behind = node.plane.distance(to);
   if (leaf_of(from + before / (before - behind) * (to - from)) != leaf) return false;
   last = index;
   if (++node.against < gone[static_cast<std::size_t>(plane)]) return false;
