@@ -71,6 +71,13 @@ class Examination {
   bool try_leg_hypotheses();
   void examine_leg_rotation();
   void settle_imu_link(const SO3& measured);
+  struct LegWay {
+    double scale = 1, sigma = 0;  // way by the legs through way by the LiDAR
+    std::size_t windows = 0;
+    std::optional<double> height;  // m, of the LiDAR: by the legs less by its points
+  };
+  LegWay measure_leg_way(const LegHypothesis* hypothesis) const;
+  bool accuse_exchanged_legs(double scale, const std::string& evidence);
   void examine_leg_lengths();
   void accuse_leg_lengths(double scale, double height);
   void accuse_imu_place(double height);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
+#include <tuple>
 
 #include "lab/doctor/examination.hpp"
 #include "lab/doctor/leg_hypotheses.hpp"
@@ -136,28 +137,56 @@ class WayOfLegs {
 
 }  // namespace
 
-void Examination::examine_leg_lengths() {
-  if (!translation_ || way_.empty() || translation_->g_W.norm() < 5) {
-    check(Sensor::legs, "lengths of the legs", Check::Verdict::unknown, "no LiDAR whose way is known");
-    return;
-  }
+Examination::LegWay Examination::measure_leg_way(const LegHypothesis* hypothesis) const {
   const GyroPath path = gyro();
   const Eigen::Vector3d up_W = -translation_->g_W.normalized();
   const SE3 T_link_imu = robot_.imu.T_link_imu, T_link_lidar = T_link_imu * robot_.lidar.T_imu_lidar;
   const LidarWay lidar = lidar_way();
   WayOfLegs way(up_W, T_link_lidar.p);
-  for (const LegPose& pose : legs_under(nullptr)) {
+  for (const LegPose& pose : legs_under(hypothesis)) {
     const double t = pose.t + leg_offset_;
     const auto T_WI = lidar.at(t, path);
     const bool inside = T_WI && path.covers(t - 0.1, t + 0.1);
     way.add(t, pose, inside ? std::optional(*T_WI * T_link_imu.inverse()) : std::nullopt,
             inside && path.rate(t - 0.1, t + 0.1).norm() < 0.06);
   }
-  const auto [scale, sigma] = way.scale();
-  std::optional<double> height;
+  LegWay out;
+  std::tie(out.scale, out.sigma) = way.scale();
+  out.windows = way.windows();
   if (const auto by_legs = way.height()) {
-    if (const auto by_points = height_by_lidar(recorded_.sweeps, way_, up_W, way.still_until())) height = *by_legs - *by_points;
+    if (const auto by_points = height_by_lidar(recorded_.sweeps, way_, up_W, way.still_until())) out.height = *by_legs - *by_points;
   }
+  return out;
+}
+
+// Legs of the same axes left and right turn the same when their joints are exchanged; only the way differs.
+bool Examination::accuse_exchanged_legs(double scale, const std::string& evidence) {
+  for (const LegHypothesis& h : leg_hypotheses(recorded_, robot_)) {
+    if (h.cause != "joints_swapped") continue;
+    const LegWay way = measure_leg_way(&h);
+    if (!std::isfinite(way.sigma) || std::abs(way.scale - 1) > std::min(scale_tolerance, 0.5 * std::abs(scale - 1))) return false;
+    find({h.culprit,
+          h.cause,
+          h.name,
+          fmt::format("{}; {:.3f} when they are exchanged", evidence, way.scale),
+          h.setting,
+          scale - 1,
+          {},
+          {},
+          true});
+    leg_mend_ = leg_mend_ ? joined(*leg_mend_, h) : h;
+    return true;
+  }
+  return false;
+}
+
+void Examination::examine_leg_lengths() {
+  if (!translation_ || way_.empty() || translation_->g_W.norm() < 5) {
+    check(Sensor::legs, "lengths of the legs", Check::Verdict::unknown, "no LiDAR whose way is known");
+    return;
+  }
+  const LegWay way = measure_leg_way(nullptr);
+  const auto& [scale, sigma, windows, height] = way;
   const bool scale_wrong = std::abs(scale - 1) > std::max(scale_tolerance, sure * sigma);
   // A LiDAR that was found elsewhere is known to some centimetres only.
   const bool moved = std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "lidar_position"; });
@@ -165,11 +194,12 @@ void Examination::examine_leg_lengths() {
   const std::string detail = fmt::format(
       "way by the legs / way by the LiDAR {:.3f}, standard deviation {:.3f}, in {} s; height of the LiDAR by the legs less that by its "
       "points {}",
-      scale, sigma, way.windows(), height ? fmt::format("{:.1f} cm", 100 * *height) : "unknown");
+      scale, sigma, windows, height ? fmt::format("{:.1f} cm", 100 * *height) : "unknown");
   if (!scale_wrong && !height_wrong) {
     check(Sensor::legs, "lengths of the legs", std::isfinite(sigma) ? Check::Verdict::good : Check::Verdict::unknown, detail);
     return;
   }
+  if (scale_wrong && accuse_exchanged_legs(scale, detail)) return;
   // Legs that are too long walk too far and stand too high; an IMU that is too high only stands too high.
   const bool lengths = height_wrong ? (scale - 1) * *height > 0 && std::abs(scale - 1) > 0.02 : true;
   if (lengths) {
