@@ -14,7 +14,7 @@
 namespace kilvo::dds {
 
 struct DdsInputs::Publisher {
-  std::string key;  // the bytes of its identifier
+  std::string key;          // the bytes of its identifier
   std::string topic, type;  // type: plain
   std::string partition;    // the first; empty: none
   bool is_exclusive = false;

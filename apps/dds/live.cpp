@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "apps/dds/dds_inputs.hpp"
+#include "apps/dds/dds_log.hpp"
 #include "apps/dds/dds_outlet.hpp"
 #include "apps/dds/services.hpp"
 #include "apps/node/node.hpp"
@@ -13,6 +14,7 @@ namespace kilvo::dds {
 
 void run_live(const LiveOptions& options, const lab::Settings& settings, const std::function<bool()>& is_over,
               const std::function<void(const std::string&)>& say, const node::Outlet* log) {
+  const DdsLog words(say);
   const Domain domain(options.domain);
   DdsOutlet topics(domain, options.name);
   node::Node node(options.node, settings, log == nullptr ? topics.outlet() : node::both(topics.outlet(), *log), say);

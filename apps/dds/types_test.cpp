@@ -4,7 +4,10 @@
 #include <cstdio>
 #include <dds/dds.h>
 #include <gtest/gtest.h>
+#include <string>
+#include <vector>
 
+#include "apps/dds/dds_log.hpp"
 #include "apps/dds/domain.hpp"
 
 namespace kilvo::dds {
@@ -54,6 +57,14 @@ TEST(Domain, PeersByAddressNeedNoMulticast) {
   EXPECT_NE(xml.find("<Peer Address=\"192.168.123.161\"/><Peer Address=\"10.0.0.2\"/>"), std::string::npos);
   EXPECT_NE(domain_xml({0, "127.0.0.1", {}}).find("multicast=\"true\""), std::string::npos);
   EXPECT_THROW(domain_xml({0, "e\"th", {}}), DdsError);
+}
+
+TEST(DdsLog, SaysALineOfAKindOnce) {
+  std::vector<std::string> said;
+  DdsLog log([&said](const std::string& text) { said.push_back(text); });
+  for (int i = 0; i < 100; ++i) log.take("sample #" + std::to_string(i) + " of rt/imu cannot be read\n");
+  log.take("another one");
+  EXPECT_EQ(said, (std::vector<std::string>{"DDS: sample #0 of rt/imu cannot be read", "DDS: another one"}));
 }
 
 }  // namespace

@@ -124,6 +124,8 @@ class LiveTest(unittest.TestCase):
         self.assertEqual(live.end(), 0, live.said())
         self.assertIn("/points: a publisher sends sensor_msgs/LaserScan, but the sensor lidar needs sensor_msgs/PointCloud2", live.said())
         self.assertIn("/kilvo/odometry: a subscriber asks for another durability", live.said())
+        self.assertIn("deserialization rt/imu", live.said())
+        self.assertLess(live.said().count("deserialization"), 10)
 
     def test_c_a_low_state_finds_its_time(self):
         live = STORY.live("--set", "legs.topic=rt/lowstate", "--set", "legs.clock=estimated", "--set", "legs.gyro_link=pelvis", "--set",
