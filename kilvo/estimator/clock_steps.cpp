@@ -88,7 +88,8 @@ bool ClockSteps::is_sure() const {
 
 // One stamp of the IMU lies ahead, and nobody else's time has gone on so far: it is wrong, unless the next one goes on from there.
 bool ClockSteps::is_alone(Time now) {
-  const Duration usual = std::clamp(8 * period_, Duration(std::chrono::milliseconds(30)), longest_interval);
+  // Real IMUs come in bursts: what is nearer may be their way of speaking.
+  constexpr Duration usual = 2 * longest_interval;
   const bool goes_on = suspect_ && now > *suspect_ && now - *suspect_ < longest_interval;
   if (!imu_ || now - *imu_ < usual || goes_on) return suspect_.reset(), false;
   for (std::size_t s = 0; s < sensor_count; ++s) {

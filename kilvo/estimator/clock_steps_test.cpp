@@ -190,7 +190,7 @@ TEST(ClockSteps, FollowAClockThatGoesAhead) {
 }
 
 TEST(ClockSteps, OneStampOfTheImuAheadOfAllOthersCostsOneSample) {
-  for (const int ms : {60, 200, 500, 950}) {
+  for (const int ms : {250, 500, 950}) {
     SCOPED_TRACE(ms);
     Robot r;
     r.walk(seconds(2), {}, {});
