@@ -91,9 +91,10 @@ bool ClockSteps::is_alone(Time now) {
   // Real IMUs come in bursts: what is nearer may be their way of speaking.
   constexpr Duration usual = 2 * longest_interval;
   const bool goes_on = suspect_ && now > *suspect_ && now - *suspect_ < longest_interval;
-  if (!imu_ || now - *imu_ < usual || goes_on) return suspect_.reset(), false;
+  if (goes_on) return suspect_ = now, false;
+  if (!imu_ || now - *imu_ < usual) return suspect_.reset(), false;
   for (std::size_t s = 0; s < sensor_count; ++s) {
-    if (lag_[s] && newest_[s] && *newest_[s] + *lag_[s] - *imu_ > (now - *imu_) / 2) return suspect_.reset(), false;
+    if (newest_[s] && *newest_[s] - *imu_ > (now - *imu_) / 2) return suspect_.reset(), false;
   }
   suspect_ = now;
   return true;

@@ -176,7 +176,7 @@ TEST(Timeline, LegsThatComeLateOrAgainAreWaitedFor) {
   longest_wait(0, 4, late, [](double s) { return s > 0.15 ? std::optional(s - 0.15) : std::nullopt; });
   EXPECT_EQ(late, 0) << "always 150 ms late";
   longest_wait(0, 6, late, [](double s) { return s < 2 || s > 4 ? std::optional(s - 0.02) : std::nullopt; });
-  EXPECT_LE(late, 2) << "away for 2 s";
+  EXPECT_LE(late, 21) << "away for 2 s: what was measured before the IMU that has gone out already";
 }
 
 TEST(Timeline, WithoutTheImuNoSensorFillsTheMemory) {
