@@ -257,6 +257,11 @@ void Examination::blame_imu_for_all() {
   const Finding& other = leg_clock != all.end() ? *leg_clock : *camera_clock;
   constexpr double same_time = 0.009;  // s
   if (std::abs(lidar_clock->size - other.size) > same_time) return;
+  // A camera that is off by another time says that it is not the IMU that all are off against.
+  constexpr double other_time = 0.003;  // s
+  for (const Refinement& r : refinements_) {
+    if (r.sensor == Sensor::camera && r.unit == "s" && std::abs(r.change.front() - lidar_clock->size) > other_time) return;
+  }
   const double offset = -lidar_clock->size;
   std::erase_if(all, [](const Finding& x) { return x.cause == "lidar_clock" || x.cause == "legs_clock" || x.cause == "camera_clock"; });
   robot_.imu.time_offset = original_.imu.time_offset;
