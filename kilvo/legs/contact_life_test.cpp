@@ -12,12 +12,12 @@ using test::Gait;
 using test::Scene;
 using test::SoleMotion;
 
-TEST(ContactEstimator, AWalkThatBecomesARunIsFollowed) {
+TEST(ContactEstimator, AWalkThatBecomesAFastOneIsFollowed) {
   const Gait slow;
   Gait fast;
   fast.step = 1.2;
   fast.lift = 0.12;
-  fast.stance = 0.25;
+  fast.stance = 0.4;
   fast.first = 0;
   ContactEstimator estimator{LegConfig{}};
   test::watch(estimator, test::walk(slow), 0, 5.5);
