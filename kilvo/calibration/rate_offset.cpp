@@ -11,7 +11,7 @@ namespace {
 constexpr double independent = 0.01;
 // An offset is found when every other one, but its neighbours, is less likely by this (difference of the logarithms; errors of neighbouring
 // samples are alike, so it is large), over so many samples at least.
-constexpr double certain = 200, enough = 60;
+constexpr double certain = 60, enough = 60;
 constexpr int neighbours = 8;              // steps of the grid
 constexpr double forgetting = 1.0 / 1000;  // of what the grid has seen, a sample
 // How an offset wanders: delays change by a tenth of a millisecond in a second.
