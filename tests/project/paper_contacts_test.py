@@ -12,6 +12,8 @@ PROGRAM = os.path.join(ROOT, "bench", "paper", "contacts")
 STAND_IN = """#!/usr/bin/env python3
 import json, os, sys
 words = sys.argv[1:]
+if words[0] == "run" and "broken" in words[1]:
+    sys.exit("cannot be read")
 if words[0] == "run":
     out = words[words.index("--out") + 1]
     way = next(w.split("=")[1] for w in words if w.startswith("legs.contact="))
@@ -78,6 +80,17 @@ class PaperContacts(unittest.TestCase):
         self.assertEqual(len(calls), 4 + 8)  # the legs alone; beside the LiDAR where there is one
         self.assertTrue(all(c[3].endswith("icub.yaml") and c[2] == "legs,imu" for c in calls if c[0] == "icub_walk.bag"))
         self.assertEqual({c[2] for c in calls if c[0] == "recording.bag"}, {"legs,imu", "legs,imu,lidar"})
+
+    def test_a_recording_that_fails_is_named_and_the_others_are_kept(self):
+        for name in ("icub_walk", "icub_broken"):
+            for ending in (".bag", ".contact.csv", ".gt.tum"):
+                self.write("rec/" + name + ending)
+        done = self.run_it()
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("| icub_walk | - | 80.0 | 90.0 | 97.0 |", done.stdout)
+        self.assertNotIn("| icub_broken", done.stdout)
+        self.assertIn("icub_broken, paper:", done.stderr)
+        self.assertIn("cannot be read", done.stderr)
 
     def test_what_is_missing_is_named(self):
         done = self.run_it()
