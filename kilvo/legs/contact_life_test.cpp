@@ -28,7 +28,7 @@ TEST(ContactEstimator, AWalkThatBecomesAFastOneIsFollowed) {
   later.body = [fast](double s) { return fast.body(s - 6); };
   std::vector<Change> run = test::watch(estimator, later, 6.0, 12.0);
   for (Change& c : run) c.s -= 6;
-  test::expect_changes(fast, run, 1.5, 5.5, 0.03, 0.03);
+  test::expect_changes(fast, run, 1.6, 5.4, 0.03, 0.03);
 }
 
 TEST(ContactEstimator, ARunThatBecomesASlowWalkIsFollowed) {
