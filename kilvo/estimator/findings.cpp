@@ -103,6 +103,12 @@ void Estimator::report_use(const Use& before) {
       events_.state({now(), static_cast<Sensor>(s), reason, ahead, drops_[s][r], {}});
     }
   }
+  const auto lidar = static_cast<std::size_t>(Sensor::lidar), nowhere = static_cast<std::size_t>(Reason::fits_nowhere);
+  const std::uint64_t refused = drops_[lidar][nowhere] - before.dropped[lidar][nowhere];
+  if (!statistics_.diverged && refused > few && refused > statistics_.sensors[lidar].used - before.used[lidar]) {
+    contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar), static_cast<double>(refused),
+               "most sweeps did not fit the map where they should have been");
+  }
   if (events_.all() != statistics_.events) statistics_.events = events_.all();
 }
 

@@ -84,7 +84,7 @@ TEST(Relocation, TakesNoneOfTwoPlacesThatLookAlike) {
 
 TEST(Relocation, IsNotNeededAlongWhatSweepsDoNotKnow) {
   const Place place;
-  const Estimate e = place.guess({}, 0, 2, 0.01);
+  const Estimate e = place.guess(Eigen::Vector3d::Zero(), 0, 2, 0.01);
   PoseCovariance known = PoseCovariance::Identity();
   EXPECT_TRUE(needs_search(e.P, known));
   known(3, 3) = known(4, 4) = 0;
