@@ -26,9 +26,9 @@ TEST(Types, AreDescribedAsUnitreesHeadersDoIt) {
     const DdsType* type = find_type(known.name);
     ASSERT_NE(type, nullptr);
     EXPECT_EQ(type->layout->type_mapping.sz, known.object_bytes) << known.name;
-    // In the type information the minimal hash follows 24 bytes of lengths.
+    // In the type information the minimal hash follows 20 bytes of lengths.
     std::string hash;
-    for (std::size_t i = 24; i < 30; ++i) {
+    for (std::size_t i = 20; i < 26; ++i) {
       char digits[3];
       std::snprintf(digits, sizeof digits, "%02x", type->layout->type_information.data[i]);
       hash += digits;

@@ -32,7 +32,8 @@ const Walked& walked() {
       Recorder recorder;
       while (const auto measurement = simulator.next()) recorder.push(*measurement);
       Walked out{recorder.finish(), {}};
-      out.robot = parse_settings(simulated_config(config, ""), "simulated", ".").robot;
+      const std::string urdf = std::string(KILVO_SOURCE_DIR) + "/config/robots/sim.urdf";
+      out.robot = parse_settings(simulated_config(config, urdf), "simulated", ".").robot;
       out.robot.urdf = urdf_of(config.shape);
       return out;
     }

@@ -181,7 +181,7 @@ TEST(OpenRecording, SaysWhatIsWrongWithAnInputAndNamesIt) {
   EXPECT_EQ(with_content("#ROS"), name + ": not a recording (a ROS 1 bag, MCAP, or rosbag2's .db3)");
   EXPECT_EQ(with_content("hello, world, this is no bag"), name + ": not a recording (a ROS 1 bag, MCAP, or rosbag2's .db3)");
   EXPECT_EQ(with_content("#ROSBAG V1.2\nxyz"), name + ": only ROS bags of version 2.0 are read (rosbag fix converts older ones)");
-  EXPECT_NE(with_content({"SQLite format 3\0and more", 24}).find(name + ": not a readable SQLite database"), std::string::npos);
+  EXPECT_NE(with_content({"SQLite format 3\0and more", 24}).find(name + ": a SQLite database, but not of rosbag2"), std::string::npos);
   EXPECT_EQ(error_of(folder.path()),
             folder.path().string() + ": the folder has no recording.bag and no recording of rosbag2 (.mcap, .db3)");
 }

@@ -15,9 +15,9 @@ TEST(EditSettings, AValueChangesAndNothingElse) {
   EXPECT_EQ(with_setting(text, "imu.T_link_imu.p", "[0, 0, 2]"),
             "# a robot\nimu:\n  topic: /imu  # as recorded\n  T_link_imu: {link: pelvis, p: [0, 0, 2], R: [1, 0, 0, 0, 1, 0, 0, 0, "
             "1]}\nlidar:\n  rate: 10\n");
-  EXPECT_EQ(with_setting(text, "imu.topic", "/other").substr(16, 40), "  topic: /other  # as recorded\n  T_link_i");
-  EXPECT_EQ(with_setting(text, "imu.T_link_imu.link", "torso").substr(47, 33), "  T_link_imu: {link: torso, p: [0");
-  EXPECT_EQ(with_setting(text, "lidar.rate", "20").substr(text.size() - 19), "lidar:\n  rate: 20\n");
+  EXPECT_EQ(with_setting(text, "imu.topic", "/other").substr(15, 40), "  topic: /other  # as recorded\n  T_link_");
+  EXPECT_EQ(with_setting(text, "imu.T_link_imu.link", "torso").substr(44, 33), "  T_link_imu: {link: torso, p: [0");
+  EXPECT_EQ(with_setting(text, "lidar.rate", "20").substr(text.size() - 18), "lidar:\n  rate: 20\n");
 }
 
 TEST(EditSettings, AMissingKeyJoinsItsSection) {

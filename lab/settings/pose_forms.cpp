@@ -74,10 +74,12 @@ std::string inverse_pose_text(const YAML::Node& pose) {
     if (pose[form]) T.R = read_rotation_form(form, pose[form]);
   }
   const SE3 inverse = T.inverse();
-  const Eigen::Matrix3d R = inverse.R.matrix();
+  const auto clean = [](double x) { return std::abs(x) < 1e-12 ? 0.0 : x; };  // what rounding has left of a zero
+  const Eigen::Matrix3d R = inverse.R.matrix().unaryExpr(clean);
   std::string numbers;
-  for (int i = 0; i < 9; ++i) numbers += fmt::format("{}{:.10g}", i == 0 ? "" : ", ", R(i / 3, i % 3) + 0.0);
-  return fmt::format("{{p: [{:.10g}, {:.10g}, {:.10g}], R: [{}]}}", inverse.p.x() + 0.0, inverse.p.y() + 0.0, inverse.p.z() + 0.0, numbers);
+  for (int i = 0; i < 9; ++i) numbers += fmt::format("{}{:.10g}", i == 0 ? "" : ", ", R(i / 3, i % 3));
+  return fmt::format("{{p: [{:.10g}, {:.10g}, {:.10g}], R: [{}]}}", clean(inverse.p.x()), clean(inverse.p.y()), clean(inverse.p.z()),
+                     numbers);
 }
 
 }  // namespace kilvo::lab

@@ -218,7 +218,9 @@ TEST(Settings, ACompleteSensorIsAskedForOnlyWhenUsed) {
     require_complete(s, both);
     FAIL();
   } catch (const ConfigError& error) {
-    EXPECT_STREQ(error.what(), "robot.yaml: lidar.T_imu_lidar.p is missing: the sensor 'lidar' cannot be used without it");
+    EXPECT_STREQ(error.what(),
+                 "robot.yaml: lidar.T_imu_lidar.p is missing: the sensor 'lidar' cannot be used without it\n"
+                 "robot.yaml: lidar.T_imu_lidar.R is missing: the sensor 'lidar' cannot be used without it");
   }
 }
 

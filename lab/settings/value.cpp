@@ -61,7 +61,8 @@ bool read_bool(const YAML::Node& node) {
 }
 
 std::string read_text(const YAML::Node& node) {
-  if (!node.IsScalar() || node.Scalar().empty()) refuse(node, "a text");
+  // Empty quotes are a text: the settings that may be empty are printed so.
+  if (!node.IsScalar() || (node.Scalar().empty() && is_plain(node))) refuse(node, "a text");
   return node.Scalar();
 }
 

@@ -43,7 +43,7 @@ TEST_F(BadInput, FilesThatAreNoRecording) {
   write_text(folder / "x.mcap", "\x89MCAP0\r\n");
   expect_refused(kilvo({"run", folder / "x.mcap", "--config", config(), "--out", out()}), 3, "holds no messages");
   write_text(folder / "x.db3", std::string("SQLite format 3\0 and no more", 29));
-  expect_refused(kilvo({"run", folder / "x.db3", "--config", config(), "--out", out()}), 3, "not a readable SQLite database");
+  expect_refused(kilvo({"run", folder / "x.db3", "--config", config(), "--out", out()}), 3, "a SQLite database, but not of rosbag2");
 }
 
 TEST_F(BadInput, AnEmptyBag) {

@@ -154,9 +154,10 @@ TEST_F(Run, TheWorldMayBeTheFirstImuFrame) {
 }
 
 TEST_F(Run, ResultsOfAnEarlierRunAreReplaced) {
-  ASSERT_EQ(run().code, 0);
+  // In the frame of the first sample: a world that is levelled by all that is known at the end depends on the length of the run.
+  ASSERT_EQ(run({"--set", "estimator.gravity_align=false"}).code, 0);
   const std::string before = read_text(folder / "out/odometry.tum");
-  ASSERT_EQ(run({"--duration", "2"}).code, 0);
+  ASSERT_EQ(run({"--duration", "2", "--set", "estimator.gravity_align=false"}).code, 0);
   EXPECT_LT(read_text(folder / "out/odometry.tum").size(), before.size());
   EXPECT_EQ(before.substr(0, 1000), read_text(folder / "out/odometry.tum").substr(0, 1000));
 }

@@ -292,8 +292,13 @@ TEST_F(Consistency, InAKnownWorldTheErrorOfKilIsWhatTheCovarianceSays) {
 }
 
 TEST_F(Consistency, OnLegsOfKnownNoiseVelocityAndTiltAreAsGoodAsTheCovarianceSays) {
-  expect_strict("velocity", all_.rigid, &Sample::velocity, 3);
-  expect_strict("tilt", all_.rigid, &Sample::tilt, 2);
+  // The noise of the soles is learnt while the robot walks, with a floor: on soles that do not move at all the covariance stays the larger.
+  for (const auto& [name, part, degrees] : {std::tuple("velocity", &Sample::velocity, 3.0), std::tuple("tilt", &Sample::tilt, 2.0)}) {
+    const double mean = share(all_.rigid, part, 0, limits(degrees, all_.rigid.size()).high).mean / degrees;
+    testing::Test::RecordProperty(name, std::to_string(mean));
+    EXPECT_GT(mean, 0.4) << name;
+    EXPECT_LT(mean, 2.0) << name;
+  }
 }
 
 // With the noise that is shipped only from above: what a standing foot of a real robot does, settle, bend and roll, on any floor, is in it,
