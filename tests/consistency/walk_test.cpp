@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <random>
+#include <tuple>
 
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/math/deterministic_sum.hpp"
