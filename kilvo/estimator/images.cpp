@@ -116,6 +116,13 @@ void Estimator::process(const CameraImage& image) {
   if (!keep_finite(true)) return drop(Sensor::camera, Reason::not_finite);
   const Eigen::Vector3d omega = replay_.gyro_at(image.t).value_or(prior.x.bg) - prior.x.bg;
   if (at == image.t) check_mount(model, prior.x.R, omega);
+  if (image.t < mount_doubted_until_) {
+    // Its patches lie where the wrong mount put them.
+    visual_map_ = VisualMap(config_.visual_map);
+    estimate_ = prior_before_exposure;
+    rebase(*estimate_);
+    return drop(Sensor::camera, Reason::mount_doubted);
+  }
   if (says_nothing(model.report())) {
     estimate_ = prior_before_exposure;
     rebase(*estimate_);
@@ -198,7 +205,6 @@ void Estimator::check_mount(const PhotometricModel& model, const SO3& R_WI, cons
   mount_pause_ = mount_pause_ == Duration(0) ? first_pause : std::min(longest_pause, 2 * mount_pause_);
   mount_doubted_until_ = estimate_->t + mount_pause_;
   mount_check_ = MountCheck();
-  visual_map_ = VisualMap(config_.visual_map);
   const auto tenths = [](double value) { return decimals(value, 1); };
   const Eigen::Vector3d degrees = *psi * (180 / M_PI);
   report(Sensor::camera, Reason::camera_turned, degrees.norm(),
