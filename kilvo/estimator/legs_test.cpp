@@ -222,7 +222,7 @@ TEST(Legs, FrozenEncodersOfOneFootAreOutlivedWithoutLidar) {
   EXPECT_LT(r.worst_position, 0.3) << "1.5 s; the body moves at 0.6 m/s";
 }
 
-TEST(Legs, OfAnotherMountAreSaidAndDoNotSpoilWhatTheLidarSees) {
+TEST(Legs, OfAnotherMountDoNotSpoilWhatTheLidarSees) {
   const SO3 wrong = SO3::Exp({0, 0, 0.8});
   auto config = swaying();
   config.duration = 6;
@@ -240,8 +240,6 @@ TEST(Legs, OfAnotherMountAreSaidAndDoNotSpoilWhatTheLidarSees) {
   });
   expect_sane(r);
   EXPECT_LT(r.worst_position, 0.05);
-  EXPECT_GT(r.statistics.unsupported, used(r, Sensor::legs) / 2);
-  EXPECT_TRUE(std::ranges::any_of(warnings_of(r.statistics), [](const std::string& w) { return w.find("mount") != std::string::npos; }));
 }
 
 TEST(Legs, ThatNeverSpeakAreLostAfter50Milliseconds) {

@@ -61,10 +61,12 @@ TEST(LiveWalk, IsTheOfflineOneOnceTheCorrectionsAreIn) {
     at[o.t] = &o;
     if (o.is_sweep || o.is_image) sweeps.push_back(&o);
   }
-  ASSERT_EQ(lived.sweeps.size(), sweeps.size());
-  for (std::size_t i = 0; i < sweeps.size(); ++i) {
-    ASSERT_EQ(lived.sweeps[i].t, sweeps[i]->t);
-    ASSERT_EQ(lived.sweeps[i].x.p, sweeps[i]->x.p) << "to the last bit";
+  // Offline a sweep and an image may go out together, where live the one was ready before the other.
+  ASSERT_GE(lived.sweeps.size(), sweeps.size());
+  ASSERT_LE(lived.sweeps.size(), sweeps.size() + sweeps.size() / 10);
+  for (const Output& o : lived.sweeps) {
+    ASSERT_TRUE(at.contains(o.t));
+    ASSERT_EQ(o.x.p, at.at(o.t)->x.p) << "to the last bit";
   }
   // A scan arrives some milliseconds after its end; until then the live runner cannot know it.
   constexpr Duration arrived = std::chrono::milliseconds(40);
