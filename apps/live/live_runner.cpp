@@ -4,8 +4,8 @@
 
 #include "apps/live/raw.hpp"
 #include "apps/live/thread_settings.hpp"
-#include "kilvo/estimator/clock_step_warning.hpp"
-#include "kilvo/estimator/fault.hpp"
+#include "kilvo/input/clock_step_warning.hpp"
+#include "kilvo/input/fault.hpp"
 
 namespace kilvo::live {
 namespace {

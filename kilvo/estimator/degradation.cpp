@@ -11,8 +11,6 @@ constexpr double least_share = 0.005;
 constexpr double least_ratio = 1e-4;
 // Each says two things, of seven that are looked for.
 constexpr int fewest_visual_points = 10;
-// Fewer rows, or more directions than these that they do not hold: not worth the name of a registration.
-constexpr int fewest_rows = 30, most_weak = 3;
 
 }  // namespace
 
@@ -43,7 +41,5 @@ std::vector<Indicator> indicators_of(std::span<const PointXYZI> points, const Re
 std::vector<Indicator> indicators_of(int visual_points) {
   return {{"visual_points", static_cast<double>(visual_points), visual_points < fewest_visual_points}};
 }
-
-bool says_enough(const RegistrationReport& report) { return report.matched >= fewest_rows && report.degeneracy.weak_count <= most_weak; }
 
 }  // namespace kilvo

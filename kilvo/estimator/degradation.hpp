@@ -24,7 +24,4 @@ std::vector<Indicator> indicators_of(std::span<const PointXYZI> points, const Re
 /// Of an image: `visual_points`, the points of the map that it shows as they were.
 std::vector<Indicator> indicators_of(int visual_points);
 
-/// Whether a sweep says enough to count as one.
-bool says_enough(const RegistrationReport& report);
-
 }  // namespace kilvo

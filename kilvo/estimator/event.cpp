@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "kilvo/estimator/decimals.hpp"
+#include "kilvo/math/decimals.hpp"
 
 namespace kilvo {
 namespace {

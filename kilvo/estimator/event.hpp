@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "kilvo/estimator/reason.hpp"
+#include "kilvo/sensors/reason.hpp"
 #include "kilvo/sensors/measurement.hpp"
 
 namespace kilvo {

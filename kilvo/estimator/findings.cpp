@@ -1,8 +1,10 @@
-// What is reported beside the states: events, as they become true.
-#include <algorithm>
-#include <string>
+#include "kilvo/estimator/findings.hpp"
 
-#include "kilvo/estimator/estimator.hpp"
+#include <algorithm>
+#include <cmath>
+
+#include "kilvo/math/decimals.hpp"
+#include "kilvo/sensors/robot.hpp"
 
 namespace kilvo {
 namespace {
@@ -11,10 +13,22 @@ namespace {
 constexpr Duration streams_period = std::chrono::seconds(1), use_period = std::chrono::seconds(10);
 // Fewer messages than these say nothing of a sensor.
 constexpr std::uint64_t few = 20;
+// What differs from the biases at the start by more than this is no bias: of a sensor that drifts, and of none at all, m/s^2, rad/s.
+constexpr double strange_accel = 0.3, impossible_accel = 0.8, strange_gyro = 0.03, impossible_gyro = 0.1;
+// Three times the speed at which no leg of this length can walk (Froude number 1): nobody runs faster either.
+constexpr double fastest = 3.0;
+// So many times within so long nothing stood still under the robot, and the velocity was given up.
+constexpr std::uint64_t most_lost_stances = 3;
+constexpr Duration remembered = std::chrono::seconds(10);
 
 // What every start has, and what the user asked for.
 bool is_usual(Reason r) {
   return r == Reason::not_used || r == Reason::before_start || r == Reason::before_motion || r == Reason::before_sweep;
+}
+
+const char* words_for(Sensor s) {
+  constexpr const char* words[] = {"the IMU", "the legs", "the LiDAR", "the camera"};
+  return words[static_cast<int>(s)];
 }
 
 }  // namespace
@@ -27,71 +41,85 @@ std::vector<std::string> warnings_of(const Statistics& statistics) {
   return out;
 }
 
-Time Estimator::now() const { return estimate_ ? estimate_->t : health_.heard(Sensor::imu).value_or(Time{}); }
-
-void Estimator::report(std::optional<Sensor> sensor, Reason reason, double value, std::string detail) {
-  events_.raise({now(), sensor, reason, value, 1, std::move(detail)});
+void Findings::report(const Situation& now, std::optional<Sensor> sensor, Reason reason, double value, std::string detail) {
+  events_.raise({now.t, sensor, reason, value, 1, std::move(detail)});
   statistics_.events = events_.all();
 }
 
-void Estimator::drop(Sensor sensor, Reason reason, const std::string& text) {
-  const auto s = static_cast<std::size_t>(sensor);
-  ++statistics_.sensors[s].dropped[text.empty() ? text_of(reason) : text];
-  ++drops_[s][static_cast<std::size_t>(reason)];
+void Findings::drop(Sensor sensor, Reason reason, const std::string& text) {
+  ++of(sensor).dropped[text.empty() ? text_of(reason) : text];
+  ++drops_[static_cast<std::size_t>(sensor)][static_cast<std::size_t>(reason)];
 }
 
-void Estimator::change_modality(Modality modality, Reason cause) {
-  modality_ = modality;
-  cause_ = cause;
-  report({}, cause);
-}
-
-void Estimator::look_at_streams(Time t) {
+void Findings::look(Time t, const Situation& now) {
   if (t - streams_looked_at_ < streams_period) return;
   streams_looked_at_ = t;
-  report_streams();
-  look_at_agreement(t);
+  report_streams(now);
+  look_at_agreement(t, now);
   if (t - use_looked_at_ < use_period) return;
   use_looked_at_ = t;
-  report_use(used_before_);
+  report_use(used_before_, now);
   for (std::size_t s = 0; s < sensor_count; ++s) used_before_.used[s] = statistics_.sensors[s].used;
   used_before_.dropped = drops_;
   used_before_.unsupported = statistics_.unsupported;
 }
 
-void Estimator::note_clipping(ImuSample& s) {
-  clipping_.mark(s);
-  if (!s.gyro_clipped && !s.accel_clipped) return;
-  const std::uint64_t count = health_.count_clipped();
+Findings Findings::next_epoch() {
+  Findings next;
+  next.statistics_ = std::move(statistics_);
+  next.events_ = std::move(events_);
+  next.drops_ = drops_;
+  ++next.statistics_.epochs;
+  return next;
+}
+
+void Findings::finish(const Situation& now) {
+  report_streams(now);
+  report_use({}, now);
+}
+
+void Findings::report_clipping(const Situation& now, const ImuSample& s, std::uint64_t count) {
   const double value = s.gyro_clipped ? s.gyro.cwiseAbs().maxCoeff() : s.accel.cwiseAbs().maxCoeff();
-  events_.state({now(), Sensor::imu, s.gyro_clipped ? Reason::gyro_clipped : Reason::accel_clipped, value, count, {}});
+  events_.state({now.t, Sensor::imu, s.gyro_clipped ? Reason::gyro_clipped : Reason::accel_clipped, value, count, {}});
+}
+
+void Findings::report_clock_steps(const Situation& now, const ClockSteps& steps) {
+  if (steps.count() == statistics_.clock_steps) return;
+  statistics_.clock_steps = steps.count();
+  const double back = to_seconds(steps.last());
+  report(now, Sensor::imu, Reason::imu_clock_stepped, std::abs(back), back > 0 ? "back" : "ahead");
+}
+
+void Findings::report_clock_offset(const Situation& now, Sensor s, double total, double configured) {
+  statistics_.clock_shift[static_cast<std::size_t>(s)] = total;
+  report(now, s, Reason::clock_offset, total, std::string(name_of(s)) + ".time_offset to " + decimals(configured + total, 4));
 }
 
 // What the streams themselves showed.
-void Estimator::report_streams() {
-  statistics_.health = health_.streams();
+void Findings::report_streams(const Situation& now) {
+  statistics_.health = now.health.streams();
   for (std::size_t s = 0; s < sensor_count; ++s) {
     const StreamHealth& stream = statistics_.health[s];
     const auto sensor = static_cast<Sensor>(s);
     constexpr double late = 0.25;  // s
-    if (stream.off_clock > 4) events_.state({now(), sensor, Reason::clock_ahead, stream.clock_offset, stream.off_clock, {}});
-    if (stream.messages > few && stream.mean_lag > late) events_.state({now(), sensor, Reason::lagging, stream.mean_lag, 1, {}});
-    if (stream.frozen > 0) events_.state({now(), sensor, Reason::froze, 0, stream.frozen, {}});
+    if (stream.off_clock > 4) events_.state({now.t, sensor, Reason::clock_ahead, stream.clock_offset, stream.off_clock, {}});
+    if (stream.messages > few && stream.mean_lag > late) events_.state({now.t, sensor, Reason::lagging, stream.mean_lag, 1, {}});
+    if (stream.frozen > 0) events_.state({now.t, sensor, Reason::froze, 0, stream.frozen, {}});
   }
   constexpr double far_more = 10;
-  if (const double noise = replay_.accel_noise(); noise > far_more * config_.noise.accel)
-    events_.state({now(), Sensor::imu, Reason::noisy_accel, noise, 1, {}});
+  if (now.accel_noise > far_more * now.configured_noise)
+    events_.state({now.t, Sensor::imu, Reason::noisy_accel, now.accel_noise, 1, {}});
   if (events_.all() != statistics_.events) statistics_.events = events_.all();
 }
 
 // A sensor that was there and of little use since `before` is what the user must know of first.
-void Estimator::report_use(const Use& before) {
+void Findings::report_use(const Use& before, const Situation& now) {
   const std::uint64_t legs = statistics_.sensors[static_cast<std::size_t>(Sensor::legs)].used;
   const std::uint64_t unsupported = statistics_.unsupported - before.unsupported;
   // Even who runs has a foot on the ground for more than half of the time.
   if (unsupported > few && 2 * unsupported > legs - before.used[static_cast<std::size_t>(Sensor::legs)]) {
     const double share = static_cast<double>(statistics_.unsupported) / static_cast<double>(legs);
-    events_.state({now(), Sensor::legs, Reason::feet_not_still, share, 1, {}});
+    events_.state({now.t, Sensor::legs, Reason::feet_not_still, share, 1, {}});
   }
   for (std::size_t s = 0; s < sensor_count; ++s) {
     const std::uint64_t used = statistics_.sensors[s].used;
@@ -100,16 +128,73 @@ void Estimator::report_use(const Use& before) {
       const std::uint64_t dropped = drops_[s][r] - before.dropped[s][r];
       if (is_usual(reason) || dropped < few || 10 * dropped < used - before.used[s]) continue;
       const double ahead = reason == Reason::clock_ahead ? statistics_.health[s].clock_offset : 0;
-      events_.state({now(), static_cast<Sensor>(s), reason, ahead, drops_[s][r], {}});
+      events_.state({now.t, static_cast<Sensor>(s), reason, ahead, drops_[s][r], {}});
     }
   }
   const auto lidar = static_cast<std::size_t>(Sensor::lidar), nowhere = static_cast<std::size_t>(Reason::fits_nowhere);
   const std::uint64_t refused = drops_[lidar][nowhere] - before.dropped[lidar][nowhere];
   if (!statistics_.diverged && refused > few && refused > statistics_.sensors[lidar].used - before.used[lidar]) {
-    contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar), static_cast<double>(refused),
-               "most sweeps did not fit the map where they should have been");
+    contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar, now), static_cast<double>(refused),
+               "most sweeps did not fit the map where they should have been", now);
   }
   if (events_.all() != statistics_.events) statistics_.events = events_.all();
+}
+
+void Findings::report_turned_camera(const Situation& now, const Eigen::Vector3d& turned) {
+  const auto tenths = [](double value) { return decimals(value, 1); };
+  const Eigen::Vector3d degrees = turned * (180 / M_PI);
+  report(now, Sensor::camera, Reason::camera_turned, degrees.norm(),
+         tenths(degrees.x()) + ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()));
+}
+
+Sensor Findings::witness_against(Sensor s, const Situation& now) {
+  if (s != Sensor::legs && now.legs_used && now.estimate.t - now.last_used_stance < std::chrono::seconds(5)) return Sensor::legs;
+  if (s == Sensor::imu && has_lidar(now.modality)) return Sensor::lidar;
+  if (s == Sensor::imu && now.legs_used) return Sensor::legs;
+  return Sensor::imu;
+}
+
+void Findings::contradict(Reason reason, Sensor a, Sensor b, double value, const std::string& why, const Situation& now) {
+  if (reason == Reason::diverged) statistics_.diverged = true;
+  report(now, {}, reason, value, std::string(words_for(a)) + " and " + words_for(b) + " contradict each other: " + why);
+}
+
+void Findings::look_at_agreement(Time t, const Situation& now) {
+  if (agreement_looked_at_ == Time{}) {
+    first_ba_ = now.estimate.x.ba;
+    first_bg_ = now.estimate.x.bg;
+    agreement_looked_at_ = t;
+    return;
+  }
+  judge_speed(now);
+  judge_biases(now);
+  if (t - agreement_looked_at_ < remembered) return;
+  agreement_looked_at_ = t;
+  const std::uint64_t lost = statistics_.lost_stances - lost_stances_before_;
+  lost_stances_before_ = statistics_.lost_stances;
+  if (lost >= most_lost_stances && !statistics_.diverged)
+    contradict(Reason::diverged, Sensor::legs, has_lidar(now.modality) ? Sensor::lidar : Sensor::imu, static_cast<double>(lost),
+               "for seconds no foot seemed to stand still, and the velocity was given up " + std::to_string(lost) + " times in 10 s",
+               now);
+}
+
+void Findings::judge_speed(const Situation& now) {
+  const double speed = now.estimate.x.v.norm(), limit = fastest * std::sqrt(standard_gravity * now.leg_length);
+  const double sigma = std::sqrt(std::max(0.0, now.estimate.P.diagonal().segment<3>(at::v).maxCoeff()));
+  if (speed < limit || sigma > 0.3 * speed || statistics_.diverged) return;
+  contradict(Reason::diverged, Sensor::imu, has_lidar(now.modality) ? Sensor::lidar : Sensor::legs, speed,
+             "together they say a speed of " + decimals(speed, 1) + " m/s", now);
+}
+
+void Findings::judge_biases(const Situation& now) {
+  const double accel = (now.estimate.x.ba - first_ba_).norm(), gyro = (now.estimate.x.bg - first_bg_).norm();
+  const bool impossible = accel > impossible_accel || gyro > impossible_gyro;
+  if (impossible ? statistics_.diverged : (strange_biases_ || (accel < strange_accel && gyro < strange_gyro))) return;
+  strange_biases_ = true;
+  const std::string why = "the biases that would reconcile them have changed since the start by " + decimals(accel, 2) + " m/s^2 and " +
+                          decimals(gyro, 3) + " rad/s: is the mount right?";
+  contradict(impossible ? Reason::diverged : Reason::inconsistent, Sensor::imu, has_lidar(now.modality) ? Sensor::lidar : Sensor::legs, accel,
+             why, now);
 }
 
 }  // namespace kilvo

@@ -1,16 +1,16 @@
 // The asynchronous phase by itself, ahead of the estimator: what the IMU and the legs say at once, on top of a state that a sweep or an
-// image still waits to correct. A value that the estimator fills (Estimator::fork) and that then goes on alone, until the next one.
-// docs/decisions/2026-11-21-the-fast-thread-runs-ahead.md says why.
+// image still waits to correct. A value that the estimator fills (Estimator::fork) and that then goes on alone, until the next one. It runs
+// the same History and LegPipeline. docs/decisions/2026-11-21-the-fast-thread-runs-ahead.md says why.
 #pragma once
 
 #include <optional>
 
-#include "kilvo/estimator/clipping.hpp"
+#include "kilvo/estimator/history.hpp"
+#include "kilvo/estimator/imu_watch.hpp"
 #include "kilvo/estimator/output.hpp"
-#include "kilvo/estimator/replay.hpp"
-#include "kilvo/legs/contact_detector.hpp"
+#include "kilvo/estimator/sensor_status.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
-#include "kilvo/legs/stance_tracker.hpp"
+#include "kilvo/legs/leg_pipeline.hpp"
 #include "kilvo/sensors/robot.hpp"
 
 namespace kilvo {
@@ -33,35 +33,26 @@ class LivePropagator {
   std::uint32_t epoch() const { return epoch_; }
   bool started() const { return started_; }
   /// The IMU is silent: no pose until it is back.
-  bool imu_lost() const { return imu_lost_; }
+  bool imu_lost() const { return status_.imu_lost(); }
   /// Measurements of earlier stamps are of no use to it.
-  Time known() const { return closed_.t; }
+  Time known() const { return history_.closed().t; }
+
+  /// Goes on from the estimator's present state; `map_error`: of the map around there. Allocates only when it has never held so much.
+  void become(const History& history, const LegPipeline& legs, const ImuWatch& imu, const SensorStatus& status, const PoseCovariance& map_error,
+              std::uint32_t epoch);
 
  private:
-  friend class Estimator;  // fills it
   void close(Time until);
-  void miss_legs();
   bool keep_finite();
 
-  // Of the robot, never changed:
-  double leg_rate_, imu_rate_;
-
-  // From the estimator:
-  bool started_ = false, imu_lost_ = false;
-  double accel_scale_ = 1;
-  Estimate closed_;  // at an IMU sample
-  Estimate now_;     // at the newest measurement
-  Replay replay_;    // from closed_ on
-  ContactDetector contacts_;
-  StanceTracker stances_;
-  ClippingDetector clipping_;
-  std::optional<Time> last_legs_;  // while the legs are used
-  double leg_period_ = 0;          // s
-  std::uint32_t epoch_ = 0;
-  Modality modality_ = Modality::coast;
-  Reason cause_ = Reason::start;
+  double leg_rate_, imu_rate_;  // Hz
+  bool started_ = false;
+  History history_;
+  LegPipeline legs_;
+  ImuWatch imu_;
+  SensorStatus status_;
   PoseCovariance map_error_ = PoseCovariance::Zero();
-
+  std::uint32_t epoch_ = 0;
   Duration lag_{};                            // see expect_legs_after
   bool with_legs_ = false;                    // the newest output is of a leg sample
   double kinematic_us_ = 0, contact_us_ = 0;  // what that took

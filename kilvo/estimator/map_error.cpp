@@ -89,13 +89,13 @@ void MapError::registered_to_given(const SE3& T_WI, std::span<const EpochInforma
   now_ = H * (inverse * systematic * inverse + weak * at(T_WI) * weak.transpose()) * H.transpose();
 }
 
-void MapError::seen(const SE3& T_WI, std::span<const View> views, const PoseCovariance& weak) {
+void MapError::seen(const SE3& T_WI, std::span<const EarlierView> views, const PoseCovariance& weak) {
   double all = 0;
-  for (const View& view : views) all += view.weight;
+  for (const EarlierView& view : views) all += view.weight;
   if (!(all > 0)) return;
   const PoseCovariance G = from_origin(T_WI);
   PoseCovariance sum = PoseCovariance::Zero();
-  for (const View& view : views) {
+  for (const EarlierView& view : views) {
     PoseCovariance error = G * view.error * G.transpose();
     // Each metre is wrong by the same share, so that standard deviations add.
     const double sigma = std::sqrt(std::max(0.0, (weak * error * weak.transpose()).bottomRightCorner<3, 3>().trace())),

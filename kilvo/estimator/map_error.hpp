@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "kilvo/filter/pose_error.hpp"
 #include "kilvo/filter/state.hpp"
 #include "kilvo/lidar/point_to_plane.hpp"
 
@@ -37,14 +38,8 @@ class MapError {
   /// P + D as a twist at the world's origin.
   PoseCovariance total(const SE3& T_WI, const PoseCovariance& P) const;
 
-  /// A view that an image was held against.
-  struct View {
-    PoseCovariance error;  // total() when it was taken
-    double distance;       // from there, m
-    double weight;
-  };
   /// Along `weak`, which no sweep knows, D becomes what the views are wrong by, and what the way from there adds.
-  void seen(const SE3& T_WI, std::span<const View> views, const PoseCovariance& weak);
+  void seen(const SE3& T_WI, std::span<const EarlierView> views, const PoseCovariance& weak);
 
  private:
   std::vector<PoseCovariance> epochs_;           // as twists at the world's origin

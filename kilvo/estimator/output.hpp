@@ -10,7 +10,7 @@
 
 #include "kilvo/estimator/degradation.hpp"
 #include "kilvo/estimator/event.hpp"
-#include "kilvo/estimator/health.hpp"
+#include "kilvo/input/health.hpp"
 #include "kilvo/estimator/modality.hpp"
 #include "kilvo/filter/state.hpp"
 #include "kilvo/legs/contact_estimator.hpp"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kilvo/estimator/recovery.hpp"
+#include "kilvo/filter/gap.hpp"
 #include "kilvo/filter/update.hpp"
 #include "kilvo/legs/unobservable.hpp"
 

@@ -6,6 +6,13 @@
 
 namespace kilvo {
 
+/// An earlier pose that a measurement was held against.
+struct EarlierView {
+  PoseCovariance error;  // of that pose, as a twist at the world's origin
+  double distance = 0;   // from there, m
+  double weight = 0;     // how much of the measurement comes from it; only ratios matter
+};
+
 /// (theta in the body, error of p) -> twist: phi = R theta, u = dp + p x phi.
 inline PoseCovariance to_origin(const SE3& T_WI) {
   PoseCovariance G = PoseCovariance::Zero();

@@ -4,7 +4,7 @@
 #include <iterator>
 #include <string>
 
-#include "kilvo/estimator/reason.hpp"
+#include "kilvo/sensors/reason.hpp"
 
 namespace kilvo {
 namespace {

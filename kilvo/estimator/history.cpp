@@ -1,0 +1,133 @@
+#include "kilvo/estimator/history.hpp"
+
+#include <algorithm>
+
+#include "kilvo/filter/gap.hpp"
+#include "kilvo/math/stopwatch.hpp"
+
+namespace kilvo {
+namespace {
+
+// Undistortion never looks farther back than this.
+constexpr Duration trajectory_length = std::chrono::milliseconds(500);
+// What is thrown away took no less time than this, s.
+constexpr double least_gap = 0.02;
+
+// What the IMU gets wrong in the second half of a sweep also moved the points taken then: the share of the process noise until the end
+// that a sweep's correction of the middle has taken off. Half of it goes with the points' mean, G = 1 - P+ P^-1 of that into the pose:
+// P(end) = P+ + Q - G Q / 4 - Q G' / 4.
+template <int part>
+double shared_with_sweep(const Estimate& prior, const Estimate& posterior) {
+  const Eigen::Matrix3d left = posterior.P.block<3, 3>(part, part) * prior.P.block<3, 3>(part, part).inverse();
+  return 0.5 * std::clamp(1 - left.trace() / 3, 0.0, 1.0);
+}
+
+}  // namespace
+
+History::History(const EstimatorConfig& config) : replay_(config), trajectory_(trajectory_length) {}
+
+void History::begin(const Estimate& first, std::optional<Time> rest_until) {
+  base_ = closed_ = now_ = good_ = first;
+  replay_.began_at_rest(rest_until);
+  trajectory_.push(first.t, first.x.pose(), first.x.v);
+  begun_ = true;
+}
+
+Estimate History::at(Time t) {
+  Estimate e = replay_.nearest(t, base_);
+  replay_.advance(e, t, &trajectory_);
+  return e;
+}
+
+void History::record_from(const Estimate& e, Time until) {
+  Estimate ahead = replay_.nearest(until, e);
+  replay_.advance(ahead, until, &trajectory_);
+}
+
+std::optional<History::Motion> History::motion_since(Time t) const {
+  constexpr Duration longest = std::chrono::milliseconds(300);
+  if (t >= base_.t) return Motion{};
+  const auto then = trajectory_.at(t), at_base = trajectory_.at(base_.t);
+  if (!then || !at_base || base_.t - t > longest) return std::nullopt;
+  return Motion{*then, *at_base};
+}
+
+void History::close(Time t) {
+  Stopwatch watch;
+  replay_.remember(closed_);
+  replay_.close(closed_, now_, t, record());
+  now_ = closed_;
+  closing_us_ += watch.lap_us();
+}
+
+void History::settle_leg_update() {
+  if (now_.t == base_.t) base_ = now_;
+  if (now_.t == closed_.t) closed_ = now_;
+}
+
+void History::end_stances(Time t) {
+  LegStep step;
+  step.t = std::max(t, now_.t);
+  for (Stance& foot : step.foot) foot.ends = true;
+  replay_.add(step);
+  for (Estimate* e : {&now_, &closed_}) {
+    for (std::size_t side = 0; side < 2; ++side) end_stance(*e, side);
+  }
+}
+
+void History::rebase(const Estimate& e) {
+  base_ = closed_ = now_ = e;
+  replay_.forget_before(base_.t);
+}
+
+void History::rebase_to_closed() {
+  base_ = closed_;
+  replay_.forget_before(base_.t);
+}
+
+void History::correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior) {
+  replay_.correlate_with_sweep(end, shared_with_sweep<at::R>(prior, posterior), shared_with_sweep<at::p>(prior, posterior));
+}
+
+void History::inflate_velocity(double sigma) {
+  for (Estimate* e : {&now_, &closed_}) e->P.diagonal().segment<3>(at::v).array() += sigma * sigma;
+  rebase_to_closed();
+}
+
+double History::roll_back() {
+  constexpr double absurd_speed = 30;  // m/s
+  // Where the robot went since, nobody knows: about as far as it was going.
+  const Time t = std::max(now_.t, good_.t);
+  const double lost = to_seconds(t - good_.t);
+  const double thrown = now_.x.v.allFinite() ? std::min(absurd_speed, (now_.x.v - good_.x.v).norm()) : absurd_speed;
+  good_.x.p += lost * good_.x.v;
+  inflate_covariance_over_gap(good_, good_.t, t, std::max(lost, least_gap));
+  good_.t = t;
+  // What made the velocity absurd may have begun before.
+  good_.P.diagonal().segment<3>(at::v).array() += thrown * thrown;
+  for (std::size_t side = 0; side < 2; ++side) end_stance(good_, side);
+  base_ = closed_ = now_ = good_;
+  replay_.clear_steps();
+  trajectory_.clear();
+  trajectory_.push(t, now_.x.pose(), now_.x.v);
+  return lost;
+}
+
+void History::fork_from(const History& other) {
+  closed_ = other.closed_;
+  now_ = other.now_;
+  replay_.copy_since(closed_.t, other.replay_);
+  begun_ = is_fork_ = true;
+}
+
+void History::close_fork(Time until, std::optional<Time> legs) {
+  const Time newest = replay_.newest_imu_by(until);
+  if (newest <= closed_.t) return;
+  replay_.close(closed_, now_, newest, nullptr);
+  now_ = closed_;
+  replay_.forget_before(closed_.t);
+  // A sample of the IMU that came after leg samples of later stamps.
+  if (legs && *legs > now_.t) replay_.advance(now_, *legs, nullptr);
+}
+
+}  // namespace kilvo

@@ -1,0 +1,102 @@
+// The estimate over time. The base is what the last sweep or image left, at its own time; every later estimate is the base carried on by the
+// IMU samples and leg updates since then. When a sweep corrects its own time, the base is replaced and all that came since is propagated
+// again (Replay): the asynchronous and the sequential phase of the paper meet here and nowhere else.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <utility>
+
+#include "kilvo/estimator/replay.hpp"
+#include "kilvo/filter/trajectory.hpp"
+
+namespace kilvo {
+
+class History {
+ public:
+  explicit History(const EstimatorConfig& config);
+
+  /// The first estimate. `rest_until`: see Replay::began_at_rest.
+  void begin(const Estimate& first, std::optional<Time> rest_until);
+  bool has_begun() const { return begun_; }
+
+  /// At the newest measurement.
+  const Estimate& now() const { return now_; }
+  /// At the newest IMU sample, with both ends of all intervals before it.
+  const Estimate& closed() const { return closed_; }
+  /// After the last sweep or image, at its time. Nothing before it is known any more.
+  const Estimate& base() const { return base_; }
+  /// The IMU samples and leg updates since the base.
+  const Replay& replay() const { return replay_; }
+  /// The poses of the last half second.
+  const Trajectory& trajectory() const { return trajectory_; }
+
+  /// The estimate of a time not before the base. What was passed on the way is in the trajectory.
+  Estimate at(Time t);
+  /// Puts the poses from `e` to `until` into the trajectory.
+  void record_from(const Estimate& e, Time until);
+  /// How the IMU moved from `t` to the base: its poses at both, as the trajectory has them; the same when `t` is not before the base. None
+  /// when it is too long before.
+  struct Motion {
+    SE3 begin, end;
+  };
+  std::optional<Motion> motion_since(Time t) const;
+
+  /// Only keeps the sample; close() takes the estimate there.
+  void add(const ImuSample& s) { replay_.add(s); }
+  /// Brings the estimate to the IMU sample at `t`: both ends of the interval are known now.
+  void close(Time t);
+
+  /// What close() took since the last call, us.
+  double take_closing_us() { return std::exchange(closing_us_, 0); }
+
+  /// Carries now() on to `t`, of a leg sample, with the newest IMU sample held.
+  void predict_to(Time t) { replay_.predict_to(now_, t, nullptr); }
+  /// Carries now() on to `t`, with the leg updates on the way.
+  void advance_to(Time t) { replay_.advance(now_, t, record()); }
+  /// A leg update of now()'s time. Returns which feet were used and not refused.
+  std::array<bool, 2> take(const LegStep& step) { return replay_.take(now_, step); }
+  /// After take(): a leg sample of the base's or the newest IMU sample's own time belongs before the interval that begins there.
+  void settle_leg_update();
+  /// From `t` on no foot stands.
+  void end_stances(Time t);
+
+  /// now() is as at the newest IMU sample again: what comes next corrects the past.
+  void drop_leg_updates_ahead() { now_ = closed_; }
+  /// The estimate goes on from `e`, which has not become the base.
+  void resume(const Estimate& e) { now_ = closed_ = e; }
+  /// `e`, not before the base, is the base from now on, and the estimate goes on from there.
+  void rebase(const Estimate& e);
+  /// The estimate of the newest IMU sample is the base from now on.
+  void rebase_to_closed();
+  /// The pose at the time of `e` is that of `e`, its velocity has changed by `dv_W`: relative motion before stays what it was.
+  void correct_trajectory(const Estimate& e, const Eigen::Vector3d& dv_W) { trajectory_.correct(e.t, e.x.pose(), dv_W); }
+  /// A sweep until `end` took `prior` to `posterior`, of its middle: see Replay::correlate_with_sweep.
+  void correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior);
+  /// The velocity is less certain than the covariance says, by this standard deviation, m/s.
+  void inflate_velocity(double sigma);
+
+  /// The estimate of the newest IMU sample is one to go back to.
+  void remember_good() { good_ = closed_; }
+  /// now() made no sense: back to the last good estimate, carried on with what a robot may have done since. Returns how long ago it was, s.
+  double roll_back();
+
+  /// For a runner of its own: becomes what is needed to go on from the newest IMU sample of `other`. Allocates only when it has never held
+  /// so much; records no trajectory.
+  void fork_from(const History& other);
+  /// Of a fork: closes the intervals up to the newest IMU sample that is not after `until`, keeps what came later and forgets what came
+  /// before. `legs`: the newest leg update, if any.
+  void close_fork(Time until, std::optional<Time> legs);
+
+ private:
+  Trajectory* record() { return is_fork_ ? nullptr : &trajectory_; }
+
+  Replay replay_;
+  Estimate base_, closed_, now_;
+  Estimate good_;  // the last closed_ that made sense
+  Trajectory trajectory_;
+  double closing_us_ = 0;
+  bool begun_ = false, is_fork_ = false;
+};
+
+}  // namespace kilvo

@@ -1,0 +1,48 @@
+#include "kilvo/estimator/imu_watch.hpp"
+
+#include "kilvo/filter/update.hpp"
+
+namespace kilvo {
+namespace {
+
+// theta_d: an acceleration so many standard deviations from its usual is an impact.
+constexpr double unusual_acceleration = 10;
+
+}  // namespace
+
+ImuWatch::ImuWatch(const ImuMount& mount, const InitialConfig& config)
+    : clipping_(mount.gyro_range, mount.accel_range), stationarity_(config.still_gyro, config.still_accel, unusual_acceleration) {}
+
+std::optional<Reason> ImuWatch::prepare(ImuSample& s) {
+  // No robot is hit so hard, and no IMU for robots measures it, m/s^2.
+  constexpr double absurd_accel = 1000;
+  s.accel *= accel_scale_;
+  if (s.accel.norm() > absurd_accel) return Reason::absurd_value;
+  clipping_.mark(s);
+  return std::nullopt;
+}
+
+std::optional<Estimate> ImuWatch::zero_velocity_update(const Estimate& e, const ImuSample& s, const UpdateConfig& config) {
+  constexpr Duration period = std::chrono::milliseconds(100);
+  constexpr double velocity_sigma = 0.01, accel_sigma = 0.2;  // m/s, m/s^2
+  if (!stationarity_.stands() || (last_update_ && s.t - *last_update_ < period)) return std::nullopt;
+  last_update_ = s.t;
+  const auto at_rest = [&s](const State& x, const Covariance&) {
+    const Eigen::Vector3d down_I = x.R.inverse() * x.g;
+    Rows<6> rows;
+    rows.r.resize(6);
+    rows.r << x.v, x.ba - down_I - s.accel;
+    rows.H.setZero(6, at::size);
+    rows.H.block<3, 3>(0, at::v).setIdentity();
+    rows.H.block<3, 3>(3, at::R) = -skew(down_I);
+    rows.H.block<3, 3>(3, at::ba).setIdentity();
+    rows.H.block<3, 3>(3, at::g) = -x.R.matrix().transpose();
+    rows.R.setZero(6, 6);
+    rows.R.diagonal().head<3>().array() = velocity_sigma * velocity_sigma;
+    rows.R.diagonal().tail<3>().array() = accel_sigma * accel_sigma;
+    return rows;
+  };
+  return update(e, at_rest, config).posterior;
+}
+
+}  // namespace kilvo

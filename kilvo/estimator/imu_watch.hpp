@@ -1,0 +1,46 @@
+// What the IMU's samples say by themselves, before they are integrated: their unit, whether they can be believed, whether the robot stands.
+#pragma once
+
+#include <optional>
+
+#include "kilvo/estimator/clipping.hpp"
+#include "kilvo/estimator/config.hpp"
+#include "kilvo/filter/state.hpp"
+#include "kilvo/filter/stationarity.hpp"
+#include "kilvo/sensors/reason.hpp"
+#include "kilvo/sensors/robot.hpp"
+
+namespace kilvo {
+
+class ImuWatch {
+ public:
+  ImuWatch(const ImuMount& mount, const InitialConfig& config);
+
+  /// Accelerations are `scale` times what the samples say, in m/s^2.
+  void set_scale(double scale) { accel_scale_ = scale; }
+  double scale() const { return accel_scale_; }
+
+  /// Brings a sample to m/s^2 and marks what is clipped. Says why it is not to be used.
+  std::optional<Reason> prepare(ImuSample& s);
+  /// A sample that is used.
+  void add(const ImuSample& s) { stationarity_.add(s); }
+  /// The IMU was silent.
+  void restart() { stationarity_.restart(); }
+
+  /// The acceleration has been a usual one for at least `hold`: no impact.
+  bool is_calm(Time t, Duration hold) const { return stationarity_.is_usual(t, hold); }
+
+  /// With no other sensor: the estimate, if the robot looks like one at rest at `s` and this has not been said just now. It does not move,
+  /// and up is where the accelerometer says.
+  std::optional<Estimate> zero_velocity_update(const Estimate& e, const ImuSample& s, const UpdateConfig& config);
+
+  const ClippingDetector& clipping() const { return clipping_; }
+
+ private:
+  double accel_scale_ = 1;
+  ClippingDetector clipping_;
+  StationarityDetector stationarity_;
+  std::optional<Time> last_update_;  // by standing still
+};
+
+}  // namespace kilvo

@@ -1,0 +1,34 @@
+#include "kilvo/estimator/output_queue.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+namespace kilvo {
+
+void OutputQueue::add_sweep(Output o) {
+  o.is_sweep = true;
+  sweeps_.push_back(std::move(o));
+}
+
+std::optional<Output> OutputQueue::next(Time t) {
+  if (last_ && t <= *last_) return std::nullopt;
+  last_ = t;
+  std::optional<Output> o(std::in_place);
+  if (!sweeps_.empty()) {
+    o = std::move(sweeps_.front());
+    sweeps_.pop_front();
+  }
+  if (!images_.empty()) {
+    Output& image = images_.front();
+    o->is_image = true;
+    o->stages.visual_us = image.stages.visual_us;
+    o->coloured = std::move(image.coloured);
+    std::ranges::copy(image.indicators, std::back_inserter(o->indicators));
+    images_.pop_front();
+  }
+  o->t = t;
+  return o;
+}
+
+}  // namespace kilvo

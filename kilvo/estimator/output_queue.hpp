@@ -1,0 +1,29 @@
+// Results of sweeps and images, each of which goes out with one of the next states; one output for each time.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <utility>
+
+#include "kilvo/estimator/output.hpp"
+
+namespace kilvo {
+
+class OutputQueue {
+ public:
+  /// A sweep's, an image's part of an output that has yet to come.
+  void add_sweep(Output o);
+  void add_image(Output o) { images_.push_back(std::move(o)); }
+  bool empty() const { return sweeps_.empty() && images_.empty(); }
+  bool has_sweep() const { return !sweeps_.empty(); }
+
+  /// The output of `t`, with the oldest results that wait; none when one of this time has gone out, which has said it all.
+  std::optional<Output> next(Time t);
+  std::optional<Time> last() const { return last_; }
+
+ private:
+  std::deque<Output> sweeps_, images_;
+  std::optional<Time> last_;  // of what went out
+};
+
+}  // namespace kilvo

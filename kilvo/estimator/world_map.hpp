@@ -1,0 +1,44 @@
+// The map that sweeps are registered to, with how wrong it is itself.
+#pragma once
+
+#include "kilvo/estimator/map_error.hpp"
+#include "kilvo/lidar/lidar_pipeline.hpp"
+#include "kilvo/map/voxel_map.hpp"
+
+namespace kilvo {
+
+class WorldMap {
+ public:
+  WorldMap(const MapConfig& config, const LidarConfig& lidar, const Eigen::Vector3d& p_IL) : config_(config), lidar_(lidar), p_IL_(p_IL), surfaces_(config) {}
+
+  /// The surroundings are known: they stay as they are.
+  void give(VoxelMap map);
+  bool is_given() const { return is_given_; }
+  VoxelMap take() { return std::move(surfaces_); }
+
+  const VoxelMap& surfaces() const { return surfaces_; }
+
+  /// Covariance of a pose there from the map's own error, see MapError.
+  PoseCovariance error_at(const SE3& T_WI) const { return error_.at(T_WI); }
+  const MapError& error() const { return error_; }
+
+  /// A sweep was registered, and its posterior is used. `may_grow`: what it saw becomes part of the map, with how uncertain the pose was.
+  /// `unobservable`: takes a pose error to its part along what the sweep did not know.
+  void learn(const Registration& sweep, const PoseCovariance& unobservable, bool may_grow);
+  /// Along what no sweep knows images held the pose against these views.
+  void held_against(const SE3& T_WI, std::span<const EarlierView> views, const PoseCovariance& unobservable) {
+    error_.seen(T_WI, views, unobservable);
+  }
+  /// The robot is outside of the map, farther away than a search would have looked: the map begins anew around `e`.
+  void begin_anew(const Estimate& e);
+
+ private:
+  MapConfig config_;
+  LidarConfig lidar_;
+  Eigen::Vector3d p_IL_;  // m
+  VoxelMap surfaces_;
+  MapError error_;
+  bool is_given_ = false;
+};
+
+}  // namespace kilvo

@@ -1,0 +1,14 @@
+// What a robot may have done while its IMU was silent.
+#pragma once
+
+#include "kilvo/filter/state.hpp"
+
+namespace kilvo {
+
+/// After an IMU gap longer than this nothing is known of the motion in between but that it was a walking robot's, s.
+inline constexpr double blind_gap = 0.1;
+
+/// Adds to the covariance what a walking robot may have done in the part [begin, end] of a gap of `gap` s.
+void inflate_covariance_over_gap(Estimate& e, Time begin, Time end, double gap);
+
+}  // namespace kilvo

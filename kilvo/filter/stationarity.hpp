@@ -1,0 +1,41 @@
+// Whether an IMU stands still.
+#pragma once
+
+#include <optional>
+
+#include "kilvo/sensors/measurement.hpp"
+
+namespace kilvo {
+
+/// What the IMU alone says of the motion: whether it stands still, and how unusual the acceleration is now. No memory of samples, so
+/// that it costs nothing.
+class StationarityDetector {
+ public:
+  /// It stands while the standard deviations of rate (rad/s) and acceleration (m/s^2) are below these. `theta`: an acceleration so many
+  /// standard deviations from its usual is an impact.
+  StationarityDetector(double still_gyro, double still_accel, double theta)
+      : still_gyro_(still_gyro), still_accel_(still_accel), theta_(theta) {}
+
+  void add(const ImuSample& s);
+  void restart();
+  /// The IMU has looked like one of a standing robot for at least half a second.
+  bool stands() const { return quiet_blocks_ >= 2; }
+  /// The mean rate while it stood, rad/s.
+  const Eigen::Vector3d& resting_gyro() const { return resting_gyro_; }
+  /// The acceleration has been a usual one for at least `hold`.
+  bool is_usual(Time t, Duration hold) const { return usual_since_ && t - *usual_since_ >= hold; }
+
+ private:
+  void close_block();
+
+  double still_gyro_, still_accel_, theta_;
+  std::optional<Time> begin_, last_, usual_since_;
+  double n_ = 0;
+  Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero(), gyro2_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_ = Eigen::Vector3d::Zero(), accel2_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d resting_gyro_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_ = Eigen::Vector3d::Zero(), variance_ = Eigen::Vector3d::Zero();
+  int quiet_blocks_ = 0;
+};
+
+}  // namespace kilvo

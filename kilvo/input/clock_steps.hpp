@@ -1,0 +1,58 @@
+// Clocks that step back: the computer's time was set, or a recording is played in a loop; and an IMU whose clock steps either way by
+// itself, which the legs tell. What comes after the step is put after what came before, as it was measured.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "kilvo/sensors/reason.hpp"
+#include "kilvo/sensors/measurement.hpp"
+
+namespace kilvo {
+
+class ClockSteps {
+ public:
+  /// Takes the measurements in the order of their arrival and puts each onto the time axis of the first. Says why one is not to be used:
+  /// the IMU's time has stepped, and whether it stays so is not known yet. Such a one is left as it is.
+  std::optional<Reason> follow(Measurement& m);
+
+  /// How often all time went back by more than an estimator looks back: a recording is played again, or another one. What comes then has
+  /// its own stamps.
+  std::uint64_t restarts() const { return restarts_; }
+
+  /// How often the IMU's time stepped for good, and by how much it went back at the last time (ahead: negative).
+  std::uint64_t count() const { return count_; }
+  Duration last() const { return last_; }
+
+ private:
+  std::optional<Reason> follow_imu(Time t);
+  bool is_sure() const;
+  bool has_run_ahead(Time now) const;
+  bool is_alone(Time now);
+  void restart(Time imu);
+  void put(Measurement& m, std::size_t s) const;
+  void vote(std::size_t s, Time t);
+
+  std::array<Duration, sensor_count> offset_{};  // added to the stamps, by Sensor
+  // By which the stamps of each trail the IMU's as they arrive.
+  std::array<std::optional<Duration>, sensor_count> lag_;
+  // Whether each goes with the IMU is found out from its first messages after a step.
+  std::array<bool, sensor_count> open_{};
+  std::array<std::optional<Time>, sensor_count> open_until_;
+  std::array<std::optional<Time>, sensor_count> newest_;  // of each, with its offset
+  std::optional<Time> imu_;                               // the newest, with its offset
+  std::optional<Time> suspect_;                           // a stamp of the IMU ahead of all others
+  Duration period_ = std::chrono::seconds(1);             // of the IMU, lately
+  std::optional<Time> legs_;                              // the newest, with its offset
+  std::optional<Time> legs_then_;                         // when the IMU spoke last
+  std::optional<Duration> legs_behind_;                   // by which they trail the IMU when it speaks
+  Duration legs_spacing_ = std::chrono::seconds(1);
+  int elsewhere_ = 0;                    // IMU samples in a row of another time
+  Time first_there_{}, newest_there_{};  // of them
+  int for_ = 0, against_ = 0;            // messages of the others meanwhile that went with them, and that did not
+  std::uint64_t count_ = 0, restarts_ = 0;
+  Duration last_{};
+};
+
+}  // namespace kilvo

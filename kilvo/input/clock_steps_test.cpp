@@ -1,0 +1,231 @@
+#include "kilvo/input/clock_steps.hpp"
+
+#include <gtest/gtest.h>
+#include <limits>
+
+namespace kilvo {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+Time at(Duration since) { return Time(std::chrono::hours(1000)) + since; }
+
+/// An IMU of 200 Hz and legs of 1 kHz that come 3 ms late, with a camera of 10 Hz that comes 40 ms late. Stamps are of a clock that shows
+/// `shift` more.
+struct Robot {
+  ClockSteps clocks;
+  Duration now = milliseconds(0);
+  int refused = 0;
+  Duration worst_imu{}, worst_legs{}, worst_camera{};  // distance from the time of measurement
+
+  void note(Measurement m, Duration truth, Duration& worst) {
+    if (clocks.follow(m)) {
+      ++refused;
+      return;
+    }
+    const Duration off = stamp_of(m) - at(truth);
+    worst = std::max(worst, off < Duration(0) ? -off : off);
+  }
+  void walk(Duration how_long, Duration shift, Duration camera_shift) {
+    for (const Duration end = now + how_long; now < end; now += milliseconds(1)) {
+      if (now % milliseconds(5) == Duration(0)) note(ImuSample{.t = at(now + shift)}, now, worst_imu);
+      JointSample joints;
+      joints.t = at(now - milliseconds(3) + shift);
+      note(joints, now - milliseconds(3), worst_legs);
+      if (now % milliseconds(100) == milliseconds(40)) {
+        CameraImage image;
+        image.t = at(now - milliseconds(40) + camera_shift);
+        note(image, now - milliseconds(40), worst_camera);
+      }
+    }
+  }
+};
+
+TEST(ClockSteps, LeaveStampsAloneThatOnlyGoOn) {
+  Robot r;
+  r.walk(seconds(2), {}, {});
+  EXPECT_EQ(r.clocks.count(), 0u);
+  EXPECT_EQ(r.refused, 0);
+  EXPECT_EQ(r.worst_imu + r.worst_legs + r.worst_camera, Duration(0));
+}
+
+TEST(ClockSteps, PutAllThatGoBackTogetherWhereTheyWereMeasured) {
+  for (const Duration step : {Duration(-milliseconds(30)), Duration(-milliseconds(150)), Duration(-seconds(1))}) {
+    SCOPED_TRACE(std::chrono::duration<double>(step).count());
+    Robot r;
+    r.walk(seconds(2), {}, {});
+    r.walk(milliseconds(60), step, step);  // until it is sure
+    EXPECT_EQ(r.clocks.count(), 1u);
+    EXPECT_EQ(r.refused, 2);
+    r.worst_legs = r.worst_camera = {};
+    r.walk(seconds(2), step, step);
+    EXPECT_EQ(r.worst_imu, Duration(0));
+    EXPECT_EQ(r.worst_legs, Duration(0));
+    EXPECT_EQ(r.worst_camera, Duration(0));
+    EXPECT_EQ(r.clocks.last(), -step);
+  }
+}
+
+TEST(ClockSteps, LeaveASensorAloneWhoseClockDidNotStep) {
+  Robot r;
+  r.walk(seconds(2), {}, {});
+  r.walk(seconds(2), -seconds(1), {});
+  EXPECT_EQ(r.clocks.count(), 1u);
+  EXPECT_EQ(r.worst_imu, Duration(0));
+  EXPECT_EQ(r.worst_camera, Duration(0));
+}
+
+TEST(ClockSteps, LeaveItAloneHoweverLateItIsAfterwards) {
+  Robot r;
+  r.walk(seconds(2), {}, {});
+  r.walk(seconds(3), -seconds(1), {});
+  CameraImage late;
+  late.t = at(r.now - milliseconds(800));
+  r.note(late, r.now - milliseconds(800), r.worst_camera);
+  r.walk(seconds(1), -seconds(1), {});
+  EXPECT_EQ(r.worst_camera, Duration(0));
+}
+
+TEST(ClockSteps, StampsThatAreNoTimesAreRefused) {
+  Robot r;
+  r.walk(seconds(2), {}, {});
+  for (const std::int64_t ns : {std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
+    Measurement absurd = ImuSample{.t = time_from_ns(ns)};
+    EXPECT_TRUE(r.clocks.follow(absurd).has_value());
+  }
+  r.walk(seconds(1), {}, {});
+  EXPECT_EQ(r.worst_imu, Duration(0));
+}
+
+TEST(ClockSteps, TakeASecondStepLikeTheFirst) {
+  Robot r;
+  r.walk(seconds(2), {}, {});
+  r.walk(seconds(2), -seconds(1), -seconds(1));
+  r.walk(milliseconds(60), -seconds(3), -seconds(3));
+  r.worst_camera = {};
+  r.walk(seconds(2), -seconds(3), -seconds(3));
+  EXPECT_EQ(r.clocks.count(), 2u);
+  EXPECT_EQ(r.clocks.last(), seconds(2));
+  EXPECT_EQ(r.worst_imu, Duration(0));
+  EXPECT_EQ(r.worst_camera, Duration(0));
+}
+
+TEST(ClockSteps, AreNotSeenInSingleSamplesThatAreAheadOrLate) {
+  Robot r;
+  r.walk(seconds(2), {}, {});
+  for (const Duration off : {Duration(std::chrono::hours(1)), Duration(-seconds(1)), Duration(seconds(5)), Duration(milliseconds(150)),
+                             Duration(milliseconds(500)), Duration(-milliseconds(300))}) {
+    Measurement wrong = ImuSample{.t = at(r.now + off)};
+    r.clocks.follow(wrong);
+    r.walk(milliseconds(100), {}, {});
+  }
+  EXPECT_EQ(r.clocks.count(), 0u);
+  EXPECT_EQ(r.refused, 0);
+  EXPECT_EQ(r.worst_imu + r.worst_legs + r.worst_camera, Duration(0));
+}
+
+TEST(ClockSteps, OfTheImuAloneAreFollowedEitherWay) {
+  for (const Duration step : {milliseconds(30), milliseconds(-30), milliseconds(120), milliseconds(-300), milliseconds(5000)}) {
+    SCOPED_TRACE(std::chrono::duration<double>(step).count());
+    Robot r;
+    r.walk(seconds(2), {}, {});
+    const auto others_stay = [&r, step](Duration how_long) {
+      for (const Duration end = r.now + how_long; r.now < end; r.now += milliseconds(1)) {
+        if (r.now % milliseconds(5) == Duration(0)) r.note(ImuSample{.t = at(r.now + step)}, r.now, r.worst_imu);
+        JointSample joints;
+        joints.t = at(r.now - milliseconds(3));
+        r.note(joints, r.now - milliseconds(3), r.worst_legs);
+      }
+    };
+    others_stay(milliseconds(200));
+    EXPECT_EQ(r.clocks.count(), 1u);
+    EXPECT_EQ(r.clocks.last(), -step);
+    EXPECT_LE(r.refused, 9);
+    r.walk(seconds(2), {}, {});
+    EXPECT_EQ(r.clocks.count(), 2u) << "and when it is put right again";
+    EXPECT_LE(r.refused, 18);
+    EXPECT_EQ(r.worst_imu + r.worst_legs + r.worst_camera, Duration(0));
+  }
+}
+
+TEST(ClockSteps, AreNotSeenInGaps) {
+  for (const bool legs_too : {false, true}) {
+    Robot r;
+    r.walk(seconds(2), {}, {});
+    for (const Duration gap : {milliseconds(20), milliseconds(60), milliseconds(400)}) {
+      for (const Duration end = r.now + gap; r.now < end; r.now += milliseconds(1)) {
+        JointSample joints;
+        joints.t = at(r.now - milliseconds(3));
+        if (!legs_too) r.note(joints, r.now - milliseconds(3), r.worst_legs);
+      }
+      r.walk(seconds(1), {}, {});
+    }
+    EXPECT_EQ(r.clocks.count(), 0u);
+    EXPECT_LE(r.refused, legs_too ? 3 : 0);
+    EXPECT_EQ(r.worst_imu + r.worst_legs + r.worst_camera, Duration(0));
+  }
+}
+
+TEST(ClockSteps, AreNotSeenWhereLegsHaveGone) {
+  Robot r;
+  r.walk(seconds(2), {}, {});
+  for (Duration ms{}; ms < seconds(3); ms += milliseconds(5)) {
+    r.now += milliseconds(ms == seconds(1) ? 60 : 5);
+    r.note(ImuSample{.t = at(r.now)}, r.now, r.worst_imu);
+  }
+  EXPECT_EQ(r.clocks.count(), 0u);
+  EXPECT_EQ(r.worst_imu, Duration(0));
+}
+
+TEST(ClockSteps, FollowAClockThatGoesAhead) {
+  Robot r;
+  r.walk(seconds(2), {}, {});
+  const Duration ahead = seconds(10);
+  r.now += ahead;
+  r.walk(seconds(2), {}, {});
+  EXPECT_EQ(r.clocks.count(), 0u);
+  EXPECT_LE(r.refused, 2) << "until the legs show it, and the next sample";
+  EXPECT_EQ(r.worst_imu, Duration(0));
+}
+
+TEST(ClockSteps, OneStampOfTheImuAheadOfAllOthersCostsOneSample) {
+  for (const int ms : {250, 500, 950}) {
+    SCOPED_TRACE(ms);
+    Robot r;
+    r.walk(seconds(2), {}, {});
+    Measurement wrong = ImuSample{.t = at(r.now + milliseconds(ms))};
+    EXPECT_TRUE(r.clocks.follow(wrong).has_value());
+    r.now += milliseconds(1);
+    r.walk(seconds(2), {}, {});
+    EXPECT_EQ(r.refused, 0);
+    EXPECT_EQ(r.worst_imu, Duration(0));
+  }
+}
+
+TEST(ClockSteps, AGapOfTheImuWhileOthersGoOnCostsNothing) {
+  Robot r;
+  r.walk(seconds(2), {}, {});
+  for (const Duration end = r.now + milliseconds(400); r.now < end; r.now += milliseconds(1)) {
+    JointSample joints;
+    joints.t = at(r.now - milliseconds(3));
+    r.note(joints, r.now - milliseconds(3), r.worst_legs);
+  }
+  r.walk(seconds(1), {}, {});
+  EXPECT_EQ(r.refused, 0);
+}
+
+TEST(ClockSteps, ARecordingThatIsPlayedAgainIsARestartWithItsOwnStamps) {
+  Robot r;
+  r.walk(seconds(60), {}, {});
+  EXPECT_EQ(r.clocks.restarts(), 0u);
+  r.walk(seconds(1), -seconds(60), -seconds(60));
+  EXPECT_EQ(r.clocks.restarts(), 1u);
+  EXPECT_EQ(r.clocks.count(), 0u);
+  Measurement m = ImuSample{.t = at(seconds(1))};
+  EXPECT_FALSE(r.clocks.follow(m).has_value());
+  EXPECT_EQ(stamp_of(m), at(seconds(1)));
+}
+
+}  // namespace
+}  // namespace kilvo

@@ -1,0 +1,32 @@
+#include "kilvo/input/fault.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace kilvo {
+namespace {
+
+std::optional<Reason> when(bool wrong, Reason r) { return wrong ? std::optional(r) : std::nullopt; }
+
+}  // namespace
+
+std::optional<Reason> fault_of(const ImuSample& s) {
+  constexpr double absurd_gyro = 300, absurd_accel = 5000;  // rad/s, m/s^2 (or g): beyond any IMU's range
+  if (!s.gyro.allFinite() || !s.accel.allFinite()) return Reason::not_finite;
+  return when(s.gyro.norm() > absurd_gyro || s.accel.norm() > absurd_accel, Reason::absurd_value);
+}
+
+std::optional<Reason> fault_of(const JointSample& s) {
+  constexpr double absurd_position = 100, absurd_velocity = 100;  // rad or m, rad/s or m/s: no joint turns so fast
+  const auto beyond = [](const std::vector<double>& values, double limit) {
+    return std::ranges::any_of(values, [limit](double v) { return std::isfinite(v) && std::abs(v) > limit; });
+  };
+  if (s.position.empty()) return Reason::empty;
+  return when(beyond(s.position, absurd_position) || beyond(s.velocity, absurd_velocity), Reason::absurd_value);
+}
+
+std::optional<Reason> fault_of(const LidarScan& s) { return when(s.points.empty(), Reason::empty); }
+
+std::optional<Reason> fault_of(const CameraImage& s) { return when(s.image.empty(), Reason::empty); }
+
+}  // namespace kilvo

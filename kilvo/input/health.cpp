@@ -1,0 +1,185 @@
+#include "kilvo/input/health.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "kilvo/input/timeline.hpp"
+
+namespace kilvo {
+namespace {
+
+// A measurement cannot have been taken so much later than the newest of the IMU, which arrives at once, s.
+constexpr double most_ahead = 0.25, witnessed_ahead = 0.12;
+// Stamps farther apart than this are of a clock that has jumped.
+constexpr Duration jump = std::chrono::seconds(1);
+// The clocks are compared over so long, s.
+constexpr double clock_window = 0.05;
+// So many messages without a repetition show that a sensor is alive and noisy: only then does sameness mean anything.
+constexpr int alive = 20;
+// Sameness that makes a sensor frozen: samples, s, scans, images.
+constexpr int imu_same = 10, scans_same = 2, images_same = 4;
+constexpr double legs_same = 0.03;
+// Legs of a robot that stands may say the same for long; rates that vary by more than this are motion, rad/s.
+constexpr double moving = 0.05;
+constexpr double still_memory = 0.3;  // s
+
+// Of some bytes spread over a block: two clouds or pictures of a noisy sensor never agree in all of them.
+std::uint64_t fingerprint(const void* data, std::size_t bytes) {
+  const auto* p = static_cast<const unsigned char*>(data);
+  std::uint64_t h = 1469598103934665603ULL ^ bytes;
+  const std::size_t stride = std::max<std::size_t>(1, bytes / 4096);
+  for (std::size_t i = 0; i < bytes; i += stride) h = (h ^ p[i]) * 1099511628211ULL;
+  return h;
+}
+
+}  // namespace
+
+Health::Health(const Robot& robot) : rates_{robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate} {}
+
+void Health::time(StreamHealth& stream, Tracker& tracker, Time t) {
+  ++stream.messages;
+  if (tracker.stamp && t > *tracker.stamp) {
+    const double dt = to_seconds(t - *tracker.stamp);
+    const double n = static_cast<double>(stream.messages - 1);
+    const double off = dt - stream.mean_interval;
+    stream.mean_interval += off / n;
+    tracker.interval_squares += off * (dt - stream.mean_interval);
+    stream.jitter = std::sqrt(tracker.interval_squares / n);
+    stream.longest_gap = std::max(stream.longest_gap, dt);
+  }
+  tracker.stamp = t;
+}
+
+bool Health::repeats(const Measurement& m, Tracker& tracker) {
+  if (const auto* imu = std::get_if<ImuSample>(&m)) return imu->gyro == imu_.gyro && imu->accel == imu_.accel;
+  if (const auto* legs = std::get_if<JointSample>(&m)) {
+    const bool same = legs->position == position_ && legs->velocity == velocity_;
+    if (!same) position_.assign(legs->position.begin(), legs->position.end());
+    if (!same) velocity_.assign(legs->velocity.begin(), legs->velocity.end());
+    return same;
+  }
+  std::uint64_t print = 0;
+  std::uint64_t& last = tracker.stamp && std::holds_alternative<LidarScan>(m) ? cloud_ : picture_;
+  if (const auto* scan = std::get_if<LidarScan>(&m)) {
+    print = fingerprint(scan->points.data(), scan->points.size() * sizeof(LidarPoint));
+  } else {
+    const auto& pixels = std::get<CameraImage>(m).image.pixels;
+    print = fingerprint(pixels.data(), pixels.size());
+  }
+  return std::exchange(last, print) == print;
+}
+
+// Repeated values carry nothing new. Of a sensor that never repeats itself they are not used, and enough of them mean that it is frozen.
+std::optional<Reason> Health::judge_repeats(const Measurement& m, StreamHealth& stream, Tracker& tracker) {
+  const Time t = stamp_of(m);
+  if (!repeats(m, tracker)) {
+    tracker.same = 0;
+    tracker.frozen = false;
+    tracker.different = std::min(alive, tracker.different + 1);
+    return std::nullopt;
+  }
+  ++stream.repeated;
+  if (tracker.same++ == 0) tracker.same_since = t;
+  bool frozen = false;
+  switch (sensor_of(m)) {
+    case Sensor::imu:
+      if (tracker.different < alive) return tracker.different = 0, std::nullopt;
+      frozen = tracker.same >= imu_same;
+      break;
+    case Sensor::legs:
+      if (imu_motion_ < moving && !tracker.frozen) return tracker.same = 0, std::nullopt;
+      frozen = to_seconds(t - tracker.same_since) > legs_same;
+      break;
+    case Sensor::lidar:
+      frozen = tracker.same >= scans_same;
+      break;
+    case Sensor::camera:
+      frozen = tracker.same >= images_same;
+      break;
+  }
+  if (frozen && !std::exchange(tracker.frozen, true)) ++stream.frozen;
+  if (tracker.frozen) return Reason::frozen;
+  // A pair of equal IMU samples may be a driver's; leg messages may come faster than the encoders are read.
+  const bool may_be = sensor_of(m) == Sensor::legs || (sensor_of(m) == Sensor::imu && tracker.same < 2);
+  if (may_be) return std::nullopt;
+  return sensor_of(m) == Sensor::camera ? Reason::repeated_image : Reason::repeated_values;
+}
+
+// The IMU is the clock. A stamp may lie ahead of it because the IMU is silent or late, with all others; or because that clock is wrong:
+// then the IMU's messages have kept coming between those of the sensor.
+bool Health::is_ahead(Sensor s, Time t, StreamHealth& stream, Tracker& tracker) {
+  const auto& imu = trackers_[static_cast<std::size_t>(Sensor::imu)].stamp;
+  const double rate = rates_[static_cast<std::size_t>(s)];
+  const auto window = static_cast<std::uint64_t>(std::max(1.0, clock_window * rate));
+  const std::uint64_t heard = streams_[static_cast<std::size_t>(Sensor::imu)].messages;
+  ++tracker.since;
+  const double expected = 0.5 * static_cast<double>(tracker.since + tracker.before) * rates_[0] / rate;
+  const bool imu_speaks = static_cast<double>(heard - tracker.imu_before) >= expected && heard > tracker.imu_before;
+  if (tracker.since >= window) {
+    tracker.imu_before = tracker.imu_then;
+    tracker.imu_then = heard;
+    tracker.before = std::exchange(tracker.since, 0);
+  }
+  if (!imu || !imu_speaks) return false;
+  const double offset = to_seconds(t - *imu);
+  if (std::abs(offset) < 1.0) stream.mean_lag += (-offset - stream.mean_lag) / static_cast<double>(stream.messages + 1);
+  // Beyond a second it is a jump, which the timeline looks into.
+  if (offset < witnessed_ahead || offset > 1.0) return false;
+  // All others ahead alike: it is the IMU that comes late. If none is, they are witnesses.
+  int others = 0, ahead = 0;
+  for (std::size_t k = 1; k < sensor_count; ++k) {
+    if (k == static_cast<std::size_t>(s) || !trackers_[k].stamp) continue;
+    ++others;
+    ahead += to_seconds(*trackers_[k].stamp - *imu) > 0.5 * witnessed_ahead ? 1 : 0;
+  }
+  if (others > 0 && ahead == others) return false;
+  if (offset < most_ahead && (others == 0 || ahead > 0)) return false;
+  stream.clock_offset += (offset - stream.clock_offset) / static_cast<double>(++stream.off_clock);
+  return true;
+}
+
+void Health::watch_imu(const Measurement& m) {
+  if (const auto* imu = std::get_if<ImuSample>(&m)) {
+    imu_silence_ = 0;
+    for (Tracker& tracker : trackers_) tracker.heard_since_imu.reset();
+    const double share = std::min(1.0, 1.0 / (still_memory * rates_[0]));
+    const Eigen::Vector3d off = imu->gyro - gyro_mean_;
+    gyro_mean_ += share * off;
+    imu_motion_ += share * (off.norm() - imu_motion_);
+    return;
+  }
+  Tracker& tracker = trackers_[m.index()];
+  if (!tracker.heard_since_imu) tracker.heard_since_imu = tracker.stamp;
+  // What is older than the newest IMU sample has come late, unless its clock is another.
+  constexpr Duration another_clock = std::chrono::seconds(1);
+  Time since = *tracker.heard_since_imu;
+  const auto& imu = trackers_[static_cast<std::size_t>(Sensor::imu)].stamp;
+  if (imu && *imu > since && *imu - since < another_clock) since = *imu;
+  imu_silence_ = std::max(imu_silence_, std::min(1.0, to_seconds(*tracker.stamp - since)));
+}
+
+std::optional<Reason> Health::judge(const Measurement& m) {
+  const Sensor s = sensor_of(m);
+  StreamHealth& stream = streams_[m.index()];
+  Tracker& tracker = trackers_[m.index()];
+  const Time t = completion_of(m);
+  // Duplicates and what comes late, between newer ones, are the timeline's business.
+  if (tracker.stamp && t <= *tracker.stamp && *tracker.stamp - t < jump) return std::nullopt;
+  if (const auto same = judge_repeats(m, stream, tracker)) {
+    ++stream.messages;
+    return same;
+  }
+  if (s != Sensor::imu && is_ahead(s, t, stream, tracker)) {
+    ++stream.messages;
+    return Reason::clock_ahead;
+  }
+  if (const auto* imu = std::get_if<ImuSample>(&m)) {
+    imu_ = *imu;
+  }
+  time(stream, tracker, t);
+  watch_imu(m);
+  return std::nullopt;
+}
+
+}  // namespace kilvo

@@ -1,0 +1,86 @@
+#include "kilvo/input/health.hpp"
+
+#include <gtest/gtest.h>
+#include <random>
+#include <string_view>
+
+namespace kilvo {
+namespace {
+
+using std::chrono::milliseconds;
+
+// Two hundred IMU samples a second with noise; `moving` adds a rate that swings.
+class Stream {
+ public:
+  explicit Stream(bool moving) : moving_(moving) {}
+  ImuSample next() {
+    ImuSample s;
+    s.t = Time(milliseconds(5 * ++n_));
+    const double swing = moving_ ? 0.5 * std::sin(0.2 * static_cast<double>(n_)) : 0.0;
+    s.gyro = {swing + noise_(random_), noise_(random_), noise_(random_)};
+    s.accel = {noise_(random_), noise_(random_), 9.8 + noise_(random_)};
+    return s;
+  }
+
+ private:
+  bool moving_;
+  std::int64_t n_ = 0;
+  std::mt19937_64 random_{1};
+  std::normal_distribution<double> noise_{0, 0.003};
+};
+
+JointSample legs_at(Time t) { return {t, {}, {0.1, 0.2, 0.3}, {0, 0, 0}, {}}; }
+
+TEST(Health, AFrozenImuIsSaidWithin20SamplesAndIsAliveWhenItSpeaksAgain) {
+  Health health{Robot{}};
+  Stream stream(true);
+  ImuSample last;
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(health.judge(last = stream.next()), std::nullopt);
+  int used = 0;
+  for (int i = 0; i < 20; ++i) {
+    last.t += milliseconds(5);
+    used += health.judge(last) ? 0 : 1;
+  }
+  EXPECT_LE(used, 1);
+  EXPECT_TRUE(health.is_frozen(Sensor::imu));
+  ImuSample alive = stream.next();
+  alive.t = last.t + milliseconds(5);
+  EXPECT_EQ(health.judge(alive), std::nullopt);
+  EXPECT_FALSE(health.is_frozen(Sensor::imu));
+}
+
+TEST(Health, AnImuWithoutNoiseIsNotFrozen) {
+  Health health{Robot{}};
+  ImuSample s;
+  for (int i = 0; i < 500; ++i) {
+    s.t += milliseconds(5);
+    EXPECT_EQ(health.judge(s), std::nullopt);
+  }
+}
+
+TEST(Health, LegsThatSayTheSameAreFrozenOnlyWhileTheImuMoves) {
+  for (const bool moving : {false, true}) {
+    Health health{Robot{}};
+    Stream stream(moving);
+    for (int i = 0; i < 400; ++i) {
+      const ImuSample s = stream.next();
+      EXPECT_EQ(health.judge(s), std::nullopt);
+      for (int k = 1; k < 5; ++k) health.judge(legs_at(s.t + milliseconds(k)));
+    }
+    EXPECT_EQ(health.is_frozen(Sensor::legs), moving);
+  }
+}
+
+TEST(Health, SilenceOfTheImuIsCountedByTheOthersStampsAndNotByTheirAbsence) {
+  Health health{Robot{}};
+  Stream stream(true);
+  for (int i = 0; i < 100; ++i) health.judge(stream.next());
+  // The legs come for the first time, long after: no silence.
+  health.judge(legs_at(Time(milliseconds(2500))));
+  EXPECT_EQ(health.imu_silence(), 0);
+  health.judge(legs_at(Time(milliseconds(2650))));
+  EXPECT_NEAR(health.imu_silence(), 0.15, 1e-9);
+}
+
+}  // namespace
+}  // namespace kilvo

@@ -1,0 +1,62 @@
+#include "kilvo/input/input_queue.hpp"
+
+#include <algorithm>
+
+#include "kilvo/input/fault.hpp"
+
+namespace kilvo {
+
+InputQueue::InputQueue(const Robot& robot, std::array<bool, sensor_count> used, Duration max_wait, bool wait_for_images)
+    : robot_(robot),
+      used_(used),
+      max_wait_(max_wait),
+      wait_for_images_(wait_for_images),
+      health_(robot),
+      timeline_(used, max_wait, wait_for_images) {}
+
+void InputQueue::push(Measurement m) {
+  const Sensor s = sensor_of(m);
+  if (!uses(s)) return refuse(s, Reason::not_used);
+  const std::uint64_t restarts = clock_steps_.restarts();
+  const auto off_clock = clock_steps_.follow(m);  // whatever it says, it has a time
+  if (clock_steps_.restarts() > restarts) {
+    first_of_next_ = Held{std::move(m), off_clock};
+    return;
+  }
+  admit(std::move(m), off_clock);
+}
+
+void InputQueue::admit(Measurement m, std::optional<Reason> off_clock) {
+  const Sensor s = sensor_of(m);
+  if (const auto fault = fault_of(m)) return refuse(s, *fault);
+  if (off_clock) return refuse(s, *off_clock);
+  if (const auto fault = health_.judge(m)) return refuse(s, *fault);
+  const Duration by = shift_[static_cast<std::size_t>(s)];
+  if (auto* scan = std::get_if<LidarScan>(&m)) scan->t += by;
+  if (auto* image = std::get_if<CameraImage>(&m)) image->t += by;
+  if (const auto refused = timeline_.push(std::move(m))) refuse(s, *refused);
+  for (const Sensor jumped : timeline_.take_jumped()) refuse(jumped, Reason::time_jump);
+  for (const Sensor waited : timeline_.take_given_up()) refuse(waited, Reason::no_imu);
+}
+
+double InputQueue::shift_by(Sensor s, double by) {
+  constexpr double longest = 0.2;  // s
+  Duration& shift = shift_[static_cast<std::size_t>(s)];
+  const double total = std::clamp(to_seconds(shift) + by, -longest, longest);
+  shift = from_seconds(total);
+  return total;
+}
+
+void InputQueue::end() {
+  timeline_.end();
+  for (const Sensor jumped : timeline_.take_jumped()) refuse(jumped, Reason::time_jump);
+}
+
+InputQueue InputQueue::next_epoch() {
+  InputQueue next(robot_, used_, max_wait_, wait_for_images_);
+  next.clock_steps_ = clock_steps_;
+  if (auto held = std::exchange(first_of_next_, std::nullopt)) next.admit(std::move(held->measurement), held->off_clock);
+  return next;
+}
+
+}  // namespace kilvo

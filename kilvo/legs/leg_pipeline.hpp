@@ -1,0 +1,56 @@
+// One leg sample, from the feet to the rows of the update: which foot is in contact, which one stands and on which point, how much it counts.
+// Owns what has to be remembered of the legs; changes no estimate.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "kilvo/filter/state.hpp"
+#include "kilvo/legs/contact_detector.hpp"
+#include "kilvo/legs/stance_tracker.hpp"
+
+namespace kilvo {
+
+class LegPipeline {
+ public:
+  /// Throws std::invalid_argument when config.contact names no detector.
+  explicit LegPipeline(const LegConfig& config) : contacts_(config), stances_(config) {}
+
+  /// What the feet say of `predicted`, the estimate of their time, and what that took. `imu`: of the feet's time. `map`: on whose planes the feet stand,
+  /// if any. Allocates nothing.
+  struct LegUpdate {
+    LegStep step;
+    double contact_us = 0;  // the contacts' part of the time
+  };
+  LegUpdate measure(const Feet& feet, const Estimate& predicted, const ImuSample& imu, const VoxelMap* map, StanceTracker::Ground ground);
+
+  /// Which feet of the step were used, and not refused.
+  void judge(const LegStep& step, const std::array<bool, 2>& passed) { stances_.judge(step, passed); }
+
+  /// On the legs alone one foot carries unless the IMU measures a flight, and a long one is none: true when none has carried for so long
+  /// that all begins anew.
+  bool has_lost_its_stance(const LegStep& step, bool on_legs_alone);
+  /// No foot is missed before `t`.
+  void expect_a_stance_from(Time t) { last_stance_ = t; }
+
+  /// A foot was used within the time that a runner's flight lasts.
+  bool has_stood_lately(Time t) const;
+  /// The farthest that a sole has been from the IMU, and a metre at least, m.
+  double leg_length() const { return leg_length_; }
+  /// When a foot was used last.
+  Time last_used_stance() const { return last_used_stance_; }
+
+  const Contacts& contacts() const { return contacts_.contacts(); }
+
+  /// After a gap in the legs' messages, or of the estimate: nothing of before is known to be true.
+  void restart();
+
+ private:
+  ContactDetector contacts_;
+  StanceTracker stances_;
+  Time last_used_stance_{};  // when a foot was used last
+  Time last_stance_{};       // the same, or since when that is waited for
+  double leg_length_ = 1;    // m
+};
+
+}  // namespace kilvo

@@ -1,0 +1,170 @@
+#include "kilvo/lidar/lidar_pipeline.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "kilvo/filter/update.hpp"
+#include "kilvo/lidar/relocate.hpp"
+
+namespace kilvo {
+namespace {
+
+// After an outage so many sweeps in a row must agree with what was expected before the map grows again.
+constexpr int consistent_sweeps = 3;
+// Sweeps that fitted nowhere for so long: the robot is where the map is not.
+constexpr Duration longest_refusal = std::chrono::seconds(2);
+// Less than this share of a sweep's clusters on known surfaces: it says little of whether the map is the right one.
+constexpr double known_share = 0.2;
+// Fewer rows, or more directions than these that they do not hold: not worth the name of a registration.
+constexpr int fewest_rows = 30, most_weak = 3;
+
+bool says_enough(const RegistrationReport& report) { return report.matched >= fewest_rows && report.degeneracy.weak_count <= most_weak; }
+
+// A scan that was undistorted with a velocity that is not known: its ends are out of place, at the worst all on one side.
+PoseCovariance noise_of_velocity(const Covariance& P) {
+  constexpr double half_scan = 0.05, on_one_side = 0.5, per_metre = 0.3;  // s, -, rad/m
+  const double smear = half_scan * half_scan * P.diagonal().segment<3>(at::v).maxCoeff();
+  PoseCovariance out = PoseCovariance::Zero();
+  out.diagonal().head<3>().setConstant(per_metre * per_metre * smear);
+  out.diagonal().tail<3>().setConstant(on_one_side * on_one_side * smear);
+  return out;
+}
+
+// Of sound sweeps nine tenths of what meets a surface lies on it, in a crowd as well.
+bool contradicts_map(const RegistrationReport& report) {
+  constexpr double agreeing_share = 0.4;
+  const int met = report.matched + report.rejected;
+  return met > known_share * report.clusters && report.matched < agreeing_share * met;
+}
+
+}  // namespace
+
+LidarPipeline::LidarPipeline(const LidarMount& mount, const LidarConfig& config, const UpdateConfig& update, const ProcessNoise& noise,
+                             int threads)
+    : mount_(mount), config_(config), update_(update), noise_(noise), workers_(threads) {}
+
+bool LidarPipeline::has_shape(Time end, const Estimate& prior) const {
+  return end >= begins_at_ || prior.P.diagonal().segment<3>(at::v).maxCoeff() <= known_velocity * known_velocity;
+}
+
+void LidarPipeline::note_silence(Duration silence) {
+  constexpr int periods = 4;
+  if (silence > from_seconds(periods / mount_.rate)) sweeps_to_go_ = std::max(sweeps_to_go_, consistent_sweeps);
+}
+
+Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory,
+                                    const VoxelMap& map, const PoseCovariance& map_error, PointDrops& drops) {
+  Registration out;
+  out.posterior = prior;
+  out.points = undistort(scan, trajectory, prior.t, mount_, drops);
+  if (out.points.empty()) {
+    out.refused = Reason::no_usable_point;
+    return out;
+  }
+  out.clusters = downsample(out.points, prior.x.pose(), config_.voxel_size, config_.reach());
+  LidarConfig config = config_;
+  // With hysteresis: each change of mind would hand what was drifted since to the map.
+  constexpr double to_leave = 3.0;
+  if (is_blind_somewhere()) config.weak_share *= to_leave;
+  LidarModel model(map, out.clusters, mount_.T_imu_lidar.p, map_error, config, workers_);
+  if (map.empty()) {
+    out.carries = true;
+  } else {
+    const UndistortionNoise within_scan = undistortion_noise(noise_, end - prior.t);
+    out.searched = needs_search(prior.P, PoseCovariance::Identity() - unobservable_);
+    if (out.searched) {
+      search(map, prior, model, within_scan, out);
+    } else {
+      track(prior, model, within_scan, out);
+    }
+    // What holds less than three directions is no registration: it would carry the estimate while the modality says that legs do.
+    out.carries = !out.refused && says_enough(model.report());
+    if (!out.carries) out.posterior = prior;
+  }
+  out.report = model.report();
+  if (!out.carries) return out;
+  out.by_epoch = model.by_epoch();
+  out.systematic = model.systematic();
+  return out;
+}
+
+// From planes that are the nearest at the prior.
+void LidarPipeline::track(const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out) const {
+  UpdateConfig patient = update_;
+  if (is_rejoining()) patient.max_iterations *= 3;
+  const PoseCovariance noise = is_rejoining() ? within_scan.V + noise_of_velocity(prior.P) : within_scan.V;
+  const auto measured = [&](const State& x, const Covariance& P) {
+    Information<6> info = model(x, P);
+    add_common_noise(noise, info);
+    return info;
+  };
+  // A prior that has lost the trace of that noise, by legs or images since, shares less of it.
+  PoseCovariance shared = within_scan.with_prediction;
+  shared.diagonal() = shared.diagonal().cwiseMax(-0.25 * prior.P.diagonal().head<6>());
+  out.posterior = update(prior, measured, patient, &shared).posterior;
+  if (contradicts_map(model.report())) out.refused = Reason::fits_nowhere;
+}
+
+void LidarPipeline::search(const VoxelMap& map, const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan,
+                           Registration& out) {
+  const auto found = find_pose(map, out.clusters, mount_.T_imu_lidar.p, prior, config_, workers_);
+  if (!found) {
+    out.refused = Reason::fits_nowhere;
+    return;
+  }
+  rejoin();
+  constexpr double found_rotation = 0.006, found_position = 0.005;  // rad, m
+  PoseCovariance guessed = within_scan.V + noise_of_velocity(prior.P);
+  guessed.diagonal().head<3>().array() += found_rotation * found_rotation;
+  guessed.diagonal().tail<3>().array() += found_position * found_position;
+  const auto measured = [&](const State& x, const Covariance&) {
+    Information<6> info = information_at(*found, x);
+    add_common_noise(guessed, info);
+    return info;
+  };
+  out.posterior = update(prior, measured, update_).posterior;
+  model(out.posterior.x, out.posterior.P);
+}
+
+void LidarPipeline::accept(const Registration& sweep) {
+  unobservable_ = sweep.carries ? weak_part(sweep.report.degeneracy) : PoseCovariance::Identity();
+  refused_since_.reset();
+}
+
+bool LidarPipeline::may_learn(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
+  if (!is_rejoining()) return true;
+  constexpr double agreeing_share = 0.6, six_at_99_9 = 22.46;
+  const int met = sweep.report.matched + sweep.report.rejected;
+  if (met < known_share * sweep.report.clusters) return true;
+  PoseCovariance P = prior.P.topLeftCorner<6, 6>() + map_error;
+  P.diagonal().array() += 1e-6;
+  const Eigen::Matrix<double, 6, 1> change = boxminus(sweep.posterior.x, prior.x).head<6>();
+  const bool consistent = sweep.report.matched > agreeing_share * met && change.dot(P.ldlt().solve(change)) < six_at_99_9;
+  sweeps_to_go_ = consistent ? sweeps_to_go_ - 1 : consistent_sweeps;
+  return !is_rejoining();
+}
+
+bool LidarPipeline::refuse(Time t, bool map_is_given) {
+  if (!refused_since_) refused_since_ = t;
+  rejoin();
+  if (map_is_given || t - *refused_since_ < longest_refusal) return false;
+  unobservable_.setZero();
+  refused_since_.reset();
+  sweeps_to_go_ = 0;
+  return true;
+}
+
+void LidarPipeline::rejoin() { sweeps_to_go_ = consistent_sweeps; }
+
+LidarPipeline::ClockEvidence LidarPipeline::check_clock(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory,
+                                                        Time begin, Time end, double least) {
+  const auto first = trajectory.at(begin), last = trajectory.at(end);
+  if (!first || !last || end <= begin || is_blind_somewhere() || is_rejoining()) return {};
+  const Eigen::Vector3d rate = (first->R.inverse() * last->R).Log() / to_seconds(end - begin);
+  time_offset_.add((prior.x.R.inverse() * posterior.x.R).Log(), rate);
+  const ClockEvidence out = {time_offset_.is_doubtful(), time_offset_.offset(least)};
+  if (out.offset) time_offset_.restart();
+  return out;
+}
+
+}  // namespace kilvo

@@ -1,0 +1,94 @@
+// One sweep, from the message to the estimate at its middle: undistortion, clusters, registration to the map, and whether it may be believed.
+// Owns what has to be remembered of the sweeps; changes neither map nor estimate.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "kilvo/filter/predict.hpp"
+#include "kilvo/filter/trajectory.hpp"
+#include "kilvo/filter/update_config.hpp"
+#include "kilvo/lidar/point_to_plane.hpp"
+#include "kilvo/lidar/time_offset.hpp"
+#include "kilvo/lidar/undistort.hpp"
+#include "kilvo/map/voxel_map.hpp"
+#include "kilvo/sensors/reason.hpp"
+#include "kilvo/sensors/robot.hpp"
+
+namespace kilvo {
+
+/// A velocity known to this gives a sweep its shape, and tells a standing foot from a moving one, m/s.
+inline constexpr double known_velocity = 0.15;
+
+/// What a sweep says.
+struct Registration {
+  std::optional<Reason> refused;  // it says nothing of the state
+  bool searched = false;          // the prior was too uncertain for the nearest planes to be the right ones
+  Estimate posterior;             // of the prior's time
+  /// It holds at least three directions and so carries the estimate. If not, the posterior is the prior.
+  bool carries = false;
+  RegistrationReport report;
+  std::vector<PointXYZI> points;  // undistorted to the prior's time, in the IMU frame
+  std::vector<PointCluster> clusters;
+  std::vector<EpochInformation> by_epoch;              // see LidarModel
+  PoseCovariance systematic = PoseCovariance::Zero();  // see LidarModel
+};
+
+class LidarPipeline {
+ public:
+  LidarPipeline(const LidarMount& mount, const LidarConfig& config, const UpdateConfig& update, const ProcessNoise& noise, int threads);
+
+  /// Sweeps that end before `t` are used only when the velocity is known: one of an unknown velocity has no shape, and along a corridor
+  /// nothing would show it.
+  void begin_at(Time t) { begins_at_ = t; }
+  bool has_shape(Time end, const Estimate& prior) const;
+
+  /// A sweep begins so long after the last one that was used.
+  void note_silence(Duration silence);
+
+  /// `scan` lasts until `end`. `prior`: at the scan's middle. `trajectory`: covers the scan. `map_error`: of the map around the prior. An
+  /// empty map takes the sweep as it is. `drops`: counts the points that are not used.
+  Registration measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory, const VoxelMap& map,
+                       const PoseCovariance& map_error, PointDrops& drops);
+
+  /// The registration is used: which directions it knew is remembered.
+  void accept(const Registration& sweep);
+  /// After an accepted registration: whether the map may grow by it. After an outage the map is joined again, not smeared: it grows when
+  /// sweeps have agreed with the prediction some times, or where it has not been before. `map_error`: of the map around the prior.
+  bool may_learn(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
+  /// A sweep until `t` was refused. True when that has lasted for so long that the robot must be outside of the map, and the map is to
+  /// begin anew; never when it `is_given`.
+  bool refuse(Time t, bool map_is_given);
+  /// The pose is not known any more: some consistent sweeps must come before the map grows again.
+  void rejoin();
+  bool is_rejoining() const { return sweeps_to_go_ > 0; }
+
+  /// What the sweeps say of the LiDAR's clock.
+  struct ClockEvidence {
+    bool doubtful = false;         // it may be off: nothing that goes with it is to be judged
+    std::optional<double> offset;  // s, to be added to the stamps from now on
+  };
+  /// Before accept(): a sweep from `begin` to `end` turned the state from `prior` to `posterior`. An offset of less than `least` s is none.
+  ClockEvidence check_clock(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory, Time begin, Time end, double least);
+
+  /// Takes a pose error to its part along what the last sweep did not know.
+  const PoseCovariance& unobservable() const { return unobservable_; }
+  bool is_blind_somewhere() const { return !unobservable_.isZero(0); }
+
+ private:
+  void track(const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out) const;
+  void search(const VoxelMap& map, const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out);
+
+  LidarMount mount_;
+  LidarConfig config_;
+  UpdateConfig update_;
+  ProcessNoise noise_;
+  Workers workers_;
+  Time begins_at_{};
+  TimeOffset time_offset_;
+  PoseCovariance unobservable_ = PoseCovariance::Zero();
+  int sweeps_to_go_ = 0;               // consistent sweeps before the map grows again
+  std::optional<Time> refused_since_;  // sweeps that fit nowhere
+};
+
+}  // namespace kilvo

@@ -1,0 +1,298 @@
+#include "kilvo/vision/visual_pipeline.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "kilvo/filter/plausible.hpp"
+#include "kilvo/filter/pose_error.hpp"
+#include "kilvo/filter/update.hpp"
+#include "kilvo/vision/depth_view.hpp"
+#include "kilvo/vision/new_points.hpp"
+#include "kilvo/vision/photometric.hpp"
+#include "kilvo/vision/select_patches.hpp"
+
+namespace kilvo {
+namespace {
+
+// A view that differs so much from those that a point has is kept as well: octaves of scale, rad.
+constexpr double new_scale = 0.4, new_angle = 0.25;
+// So many patches hold a pose by themselves.
+constexpr int enough = 20;
+
+// Fewer patches, or a smaller share of those that should be seen, do not carry an estimate.
+bool carries_estimate(const PhotometricModel::Report& report) {
+  constexpr int fewest = 10, one_in = 5;
+  return report.used >= fewest && one_in * report.used >= report.tracks - report.saturated;
+}
+
+bool is_new_view(const PatchCandidate& track) {
+  const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(track.warp.A.determinant()))));
+  return octaves > new_scale || track.view_angle > new_angle;
+}
+
+// What an image says of the pose goes into what it leaves behind only where the LiDAR is blind. Elsewhere its patches are kept where the
+// LiDAR's map has them: else two maps would come to be, each true to itself, whose rays and planes no longer meet where the surface is.
+SE3 as_the_map_has_it(const State& before, const State& after, const PoseCovariance& weak) {
+  const Eigen::Matrix<double, 6, 1> change = weak * boxminus(after, before).head<6>();
+  return {before.R * SO3::Exp(change.head<3>()), before.p + change.tail<3>()};
+}
+
+}  // namespace
+
+// Of one image, from measure() to learn(). The model keeps references to the others.
+struct VisualPipeline::Work {
+  Work(const VisualPipeline& p, const CameraImage& of, const ImageContext& in)
+      : image(of),
+        context(in),
+        T_CI(in.prior.t == of.t ? p.T_CI_ : p.T_CI_ * in.T_image.inverse() * in.T_prior),
+        pyramid(pyramid_of(to_grey(of.image), Patch::levels)),
+        depth(p.camera_, T_CI * in.prior.x.pose().inverse(), p.seen_W_),
+        tracks(select_patches(p.map_, p.camera_, T_CI * in.prior.x.pose().inverse(), depth, p.config_)),
+        model(p.map_, p.camera_, T_CI, pyramid, tracks, in.prior, p.config_),
+        prior(in.prior),
+        omega(in.gyro - in.prior.x.bg) {}
+
+  const CameraImage& image;
+  ImageContext context;
+  SE3 T_CI;
+  std::vector<GreyImage> pyramid;
+  DepthView depth;
+  std::vector<PatchCandidate> tracks;
+  PhotometricModel model;
+  Estimate prior;         // with the exposure that the image has
+  Estimate posterior;
+  Eigen::Vector3d omega;  // of the body, rad/s
+};
+
+VisualPipeline::VisualPipeline(const CameraMount& mount, const VisionConfig& config, const VisualMapConfig& map, const UpdateConfig& update,
+                               double map_radius)
+    : mount_(mount),
+      config_(config),
+      map_config_(map),
+      update_(update),
+      map_radius_(map_radius),
+      camera_(mount),
+      T_CI_(mount.T_imu_camera.inverse()),
+      map_(map) {}
+VisualPipeline::VisualPipeline(VisualPipeline&&) noexcept = default;
+VisualPipeline& VisualPipeline::operator=(VisualPipeline&&) noexcept = default;
+VisualPipeline::~VisualPipeline() = default;
+
+std::optional<VisualPipeline::Fault> VisualPipeline::fault_of(const CameraImage& image) {
+  const Image& picture = image.image;
+  if (picture.width != mount_.width || picture.height != mount_.height) {
+    const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
+    if (std::exchange(size_is_reported_, true)) return Fault{Reason::image_size, {}};
+    return Fault{Reason::image_size, size(picture.width, picture.height) + " pixels cannot be used: camera.width and camera.height say " +
+                                         size(mount_.width, mount_.height)};
+  }
+  if (picture.channels != 1 && picture.channels != 3) return Fault{Reason::image_channels, {}};
+  const std::size_t values =
+      static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height) * static_cast<std::size_t>(picture.channels);
+  if (picture.pixels.size() == values) return std::nullopt;
+  return Fault{Reason::image_cut, {}};
+}
+
+std::optional<Reason> VisualPipeline::refuses(Time image) const {
+  if (image < doubted_until_) return Reason::mount_doubted;
+  if (image < begins_at_) return Reason::before_motion;
+  if (seen_W_.empty()) return Reason::before_sweep;
+  return std::nullopt;
+}
+
+VisualRegistration VisualPipeline::measure(const CameraImage& image, const ImageContext& context) {
+  VisualRegistration out;
+  out.posterior = context.prior;
+  if (is_lost_among_patches(context)) {
+    out.refused = Reason::pose_uncertain;
+    return out;
+  }
+  work_ = std::make_unique<Work>(*this, image, context);
+  adapt_exposure(*work_);
+  work_->posterior = update_by(*work_);
+  const PhotometricModel& model = work_->model;
+  if (!is_plausible(work_->posterior) || !is_definite(work_->posterior.P)) {
+    out.posterior = work_->posterior;
+    out.refused = Reason::not_finite;
+    return out;
+  }
+  if (const auto turned = context.prior.t == image.t ? check_mount(*work_) : std::nullopt) {
+    // Its patches lie where the wrong mount put them.
+    forget_map();
+    out.turned = *turned;
+    out.refused = Reason::mount_doubted;
+    return out;
+  }
+  if (says_nothing(*work_)) {
+    out.refused = Reason::agrees_with_nothing;
+    return out;
+  }
+  out.posterior = work_->posterior;
+  out.used = model.report().used;
+  out.carries = carries_estimate(model.report());
+  out.T_WI = as_the_map_has_it(work_->prior.x, out.posterior.x, context.unobservable);
+  const bool blind = !context.unobservable.isZero(0);
+  if (blind && !context.feet_hold && out.used >= enough) out.drift = drift_of(*work_, out.posterior.x.pose());
+  return out;
+}
+
+// Lamps are switched and exposures jump: what it was says nothing, the image all.
+void VisualPipeline::adapt_exposure(Work& work) const {
+  Estimate& prior = work.prior;
+  const auto exposure = work.model.exposure_at(prior.x);
+  if (!exposure) return;
+  prior.x.tau = std::exp(exposure->log);
+  const double unsure = exposure->sigma * prior.x.tau;
+  prior.P.row(at::tau).setZero();
+  prior.P.col(at::tau).setZero();
+  prior.P(at::tau, at::tau) = unsure * unsure;
+}
+
+Estimate VisualPipeline::update_by(Work& work) const {
+  if (work.tracks.empty()) return work.prior;
+  UpdateConfig config = update_;
+  config.min_iterations = work.model.iterations();
+  config.max_iterations = std::max(config.max_iterations, work.model.iterations() + 2);
+  const auto measured = [&](const State& x, const Covariance& P) {
+    Information<7> info = work.model(x, P);
+    if (work.context.feet_hold) {
+      Eigen::Matrix<double, 7, 7> common = Eigen::Matrix<double, 7, 7>::Zero();
+      common.topLeftCorner<6, 6>() = doubt_of_way(work, x.pose());
+      add_common_noise<7>(common, info);
+    }
+    return info;
+  };
+  return update(work.prior, measured, config).posterior;
+}
+
+// Patches are found within some pixels of where they are expected. Along what the LiDAR does not see the way is the images' own: it may be
+// uncertain, and new patches are begun there.
+bool VisualPipeline::is_lost_among_patches(const ImageContext& context) const {
+  constexpr double reach = 8, depth = 3;  // px, m
+  const PoseCovariance known = PoseCovariance::Identity() - context.unobservable;
+  const PoseCovariance P = known * context.prior.P.topLeftCorner<6, 6>() * known.transpose();
+  const double turned = P.topLeftCorner<3, 3>().trace(), moved = P.bottomRightCorner<3, 3>().trace();
+  return mount_.fx * std::sqrt(std::max(0.0, turned + moved / (depth * depth))) > reach;
+}
+
+// An image that hardly any of many patches is found in is dark, covered, torn, or of another world: nothing is learnt from it, unless
+// that goes on, for then the world has changed.
+bool VisualPipeline::says_nothing(const Work& work) {
+  constexpr int one_in = 5, patient = 20;  // images
+  const PhotometricModel::Report& report = work.model.report();
+  const bool nothing = report.tracks >= enough && (report.used == 0 || one_in * report.used < report.tracks - report.saturated);
+  in_vain_ = nothing ? in_vain_ + 1 : 0;
+  return nothing && in_vain_ <= patient;
+}
+
+// Standing feet measure the way along what no sweep knows by a few parts in ten thousand, images by a part in thousand, and what they are
+// wrong by is the same in image after image until other patches are seen: beside feet, images only catch what feet get grossly wrong.
+PoseCovariance VisualPipeline::doubt_of_way(const Work& work, const SE3& T_WI) const {
+  constexpr double wrong_share = 0.3;  // of the way from the frames
+  double way = 0, weights = 0;
+  for (const auto& [frame, weight] : work.model.by_frame()) {
+    way += weight * (T_WI.p - position_of(map_.frame(frame))).norm();
+    weights += weight;
+  }
+  if (!(weights > 0)) return PoseCovariance::Zero();
+  way /= weights;
+  constexpr double shortest_step = 0.01;  // m
+  const double images = std::max(1.0, way / std::max(shortest_step, (T_WI.p - last_p_).norm()));
+  PoseCovariance V = PoseCovariance::Zero();
+  V.diagonal().tail<3>().setConstant(wrong_share * wrong_share * way * way * images);
+  return work.context.unobservable * V * work.context.unobservable.transpose();
+}
+
+std::vector<EarlierView> VisualPipeline::drift_of(const Work& work, const SE3& T_WI) const {
+  std::vector<EarlierView> out;
+  for (const auto& [frame, weight] : work.model.by_frame()) {
+    const VisualFrame& from = map_.frame(frame);
+    out.push_back({from.error, (T_WI.p - position_of(from)).norm(), weight});
+  }
+  return out;
+}
+
+Eigen::Vector3d VisualPipeline::position_of(const VisualFrame& frame) const { return (frame.T_CW.inverse() * T_CI_).p; }
+
+// The turn of the camera in the IMU frame, rad, if there is one worth speaking of. The camera is tried again later, each time later still:
+// what fooled the check may have passed.
+std::optional<Eigen::Vector3d> VisualPipeline::check_mount(const Work& work) {
+  for (const PhotometricModel::Turn& turn : work.model.turns()) {
+    const VisualFrame& frame = map_.frame(turn.frame);
+    const SO3 R_IW = T_CI_.R.inverse() * frame.T_CW.R;
+    mount_check_.add({work.prior.x.R, work.omega}, {R_IW.inverse(), frame.omega}, turn.A, turn.b);
+  }
+  const auto psi = mount_check_.misalignment();
+  if (!psi) return std::nullopt;
+  constexpr Duration first_pause = std::chrono::seconds(10), longest_pause = std::chrono::minutes(5);
+  pause_ = pause_ == Duration(0) ? first_pause : std::min(longest_pause, 2 * pause_);
+  doubted_until_ = work.posterior.t + pause_;
+  restart_mount_check();
+  return psi;
+}
+
+std::vector<ColouredPoint> VisualPipeline::learn(const VoxelMap& map, const PoseCovariance& error) {
+  const Work& work = *work_;
+  const Estimate& posterior = work.posterior;
+  const PoseCovariance known = PoseCovariance::Identity() - work.context.unobservable;
+  const SE3 T_WI = as_the_map_has_it(work.prior.x, posterior.x, work.context.unobservable);
+  VisualFrame frame;
+  frame.T_CW = work.T_CI * T_WI.inverse();
+  frame.tau = posterior.x.tau;
+  frame.omega = work.omega;
+  frame.error = error;
+  // Along what the LiDAR does not know, the error of this frame is that of the next ones: drift, which the epoch carries.
+  const PoseCovariance own = to_origin(T_WI) * known;
+  frame.noise.topLeftCorner<6, 6>() = own * work.prior.P.topLeftCorner<6, 6>() * own.transpose();
+  frame.noise(6, 6) = posterior.P(at::tau, at::tau);
+  const std::uint32_t id = map_.add_frame(frame);
+  judge_points(work, map, frame.T_CW, id);
+  for (const NewPoint& found : new_points(map, camera_, frame.T_CW, work.pyramid[0], work.depth, work.tracks, config_)) {
+    const Eigen::Vector2f pixel = found.pixel.cast<float>();
+    if (const auto patch = cut_patch(work.pyramid, pixel.cast<double>())) map_.insert(found.point, {.frame = id, .pixel = pixel, .patch = *patch});
+  }
+  map_.forget_unused_frame(id);
+  map_.forget(posterior.x.p, map_radius_);
+  last_p_ = posterior.x.p;
+  std::vector<ColouredPoint> colours =
+      colours_of(work.image.image, posterior.x.tau, camera_, work.T_CI * posterior.x.pose().inverse(), work.depth);
+  work_.reset();
+  return colours;
+}
+
+void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const SE3& T_CW, std::uint32_t frame) {
+  // A point is not denied by an image that agrees with few others either.
+  const bool is_good = 2 * work.model.report().used > work.model.report().tracks;
+  constexpr double border = 20;  // px
+  for (std::size_t i = 0; i < work.tracks.size(); ++i) {
+    const PatchCandidate& track = work.tracks[i];
+    const PhotometricModel::Verdict& verdict = work.model.verdicts()[i];
+    // Before a new view may take the place of the one that it was held against.
+    if (verdict.used || (verdict.looked && is_good)) map_.judge(track.point, track.observation, verdict.used, verdict.correlation);
+    if (!verdict.used) continue;
+    VisualPoint point = map_.point(track.point);
+    const SE3& first = map_.frame(map_.observation(point.observations[0]).frame).T_CW;
+    if (project_to_plane(map, -(first.R.inverse() * first.p), point))
+      map_.refresh(track.point, point.p_W, point.normal_W, point.variance, point.node);
+    const auto pixel = camera_.project(T_CW * point.p_W);
+    if (!is_new_view(track) || !pixel || !camera_.sees(*pixel, border)) continue;
+    const Eigen::Vector2f stored = pixel->cast<float>();
+    if (const auto patch = cut_patch(work.pyramid, stored.cast<double>()))
+      map_.observe(track.point, {.frame = frame, .pixel = stored, .patch = *patch});
+  }
+}
+
+std::optional<double> VisualPipeline::clock_offset(double least) {
+  const auto offset = mount_check_.time_offset(least);
+  if (!offset) return std::nullopt;
+  restart_mount_check();
+  forget_map();
+  return offset;
+}
+
+void VisualPipeline::restart_mount_check() { mount_check_ = MountCheck(); }
+
+void VisualPipeline::forget_map() { map_ = VisualMap(map_config_); }
+
+}  // namespace kilvo

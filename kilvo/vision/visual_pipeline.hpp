@@ -1,0 +1,112 @@
+// One image, from the message to the estimate at its time: which patches of the visual map it should show, how the pose and the exposure must
+// be for that, whether that may be believed, and what is learnt from it. Owns the visual map; changes neither the LiDAR's map nor the estimate.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kilvo/filter/pose_error.hpp"
+#include "kilvo/filter/state.hpp"
+#include "kilvo/filter/update_config.hpp"
+#include "kilvo/map/visual_map.hpp"
+#include "kilvo/map/voxel_map.hpp"
+#include "kilvo/sensors/measurement.hpp"
+#include "kilvo/sensors/reason.hpp"
+#include "kilvo/sensors/robot.hpp"
+#include "kilvo/vision/camera.hpp"
+#include "kilvo/vision/colours.hpp"
+#include "kilvo/vision/mount_check.hpp"
+#include "kilvo/vision/vision_config.hpp"
+
+namespace kilvo {
+
+/// What the estimator knows when an image comes.
+struct ImageContext {
+  Estimate prior;       // at the image's time, or that of a later sweep that was there first
+  SE3 T_image, T_prior;  // poses of the IMU at the image's and at the prior's time, in one frame, any; the same when the times are
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();        // at the image's time, as measured, rad/s
+  PoseCovariance unobservable = PoseCovariance::Zero();  // takes a pose error to its part along what the last sweep did not know
+  bool feet_hold = false;                                // standing feet measure the way along that
+};
+
+/// What an image says.
+struct VisualRegistration {
+  std::optional<Reason> refused;
+  Eigen::Vector3d turned = Eigen::Vector3d::Zero();  // of mount_doubted: by how much the camera seems to be, about the IMU's axes, rad
+  Estimate posterior;                                // of the prior's time; of a refused image the prior, unless it is not finite
+  SE3 T_WI;                                          // where the image's patches are kept, see VisualPipeline::learn
+  int used = 0;                                      // patches that were found as they were
+  bool carries = false;                              // so many that they carry the estimate
+  /// Along what no sweep knows the pose is wrong by what the frames are that it was held against, as learn() was told of them.
+  std::vector<EarlierView> drift;
+};
+
+class VisualPipeline {
+ public:
+  VisualPipeline(const CameraMount& mount, const VisionConfig& config, const VisualMapConfig& map, const UpdateConfig& update, double map_radius);
+  VisualPipeline(VisualPipeline&&) noexcept;
+  VisualPipeline& operator=(VisualPipeline&&) noexcept;
+  ~VisualPipeline();
+
+  struct Fault {
+    Reason reason;
+    std::string detail;  // of a size that is not the configured one, the first time
+  };
+  /// What makes an image no use at all, if anything.
+  std::optional<Fault> fault_of(const CameraImage& image);
+
+  /// Images of stamps before `t` are not used: patches kept while the velocity is unknown would be kept at wrong places.
+  void begin_at(Time t) { begins_at_ = t; }
+  /// Why an image of this time is not looked at, if so.
+  std::optional<Reason> refuses(Time image) const;
+
+  /// The points of a sweep (x, y, z, intensity; world, m): they tell what hides what.
+  void see(const std::vector<Eigen::Vector4f>& points_W) { seen_W_ = points_W; }
+
+  /// Registers the image.
+  VisualRegistration measure(const CameraImage& image, const ImageContext& context);
+  /// After a registration that is not refused, of the same image: the visual map learns from it. `error`: of VisualRegistration::T_WI and
+  /// of the map around it, as a twist at the world's origin. Returns the points of the sweep that the image shows, coloured.
+  std::vector<ColouredPoint> learn(const VoxelMap& map, const PoseCovariance& error);
+
+  /// s, to be added to the stamps of the images, if they are sure to be off by more than `least`. What was seen by the clock as it was is
+  /// forgotten then.
+  std::optional<double> clock_offset(double least);
+  /// The LiDAR's clock may be off: what the images say of the mount may be that.
+  void restart_mount_check();
+  /// The map begins anew.
+  void forget_map();
+
+ private:
+  struct Work;  // of the image that is registered
+  bool is_lost_among_patches(const ImageContext& context) const;
+  void adapt_exposure(Work& work) const;
+  Estimate update_by(Work& work) const;
+  bool says_nothing(const Work& work);
+  std::optional<Eigen::Vector3d> check_mount(const Work& work);
+  PoseCovariance doubt_of_way(const Work& work, const SE3& T_WI) const;
+  std::vector<EarlierView> drift_of(const Work& work, const SE3& T_WI) const;
+  void judge_points(const Work& work, const VoxelMap& map, const SE3& T_CW, std::uint32_t frame);
+  Eigen::Vector3d position_of(const VisualFrame& frame) const;
+
+  CameraMount mount_;
+  VisionConfig config_;
+  VisualMapConfig map_config_;
+  UpdateConfig update_;
+  double map_radius_;  // m
+  Camera camera_;
+  SE3 T_CI_;
+  VisualMap map_;
+  MountCheck mount_check_;
+  Time begins_at_{}, doubted_until_{};
+  Duration pause_{};  // after the mount was doubted the last time
+  int in_vain_ = 0;   // images in a row in which hardly any patch was found
+  Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();  // of the last image, m
+  std::vector<Eigen::Vector4f> seen_W_;
+  bool size_is_reported_ = false;
+  std::unique_ptr<Work> work_;
+};
+
+}  // namespace kilvo
