@@ -22,10 +22,22 @@ inline ErrorVector without(const Heading& h, const ErrorVector& d) { return d - 
 template <int Max>
 Estimate considered(const Estimate& prior, const Estimate& posterior, const Gain<Max>& gain) {
   const Heading h = heading_of(prior.x);
-  Estimate out = prior;
+  Estimate out = posterior;
   out.x = boxplus(prior.x, without(h, boxminus(posterior.x, prior.x)));
-  const auto share = (h.transpose() * gain.W()).eval();
-  out.P = posterior.P + h * (share * share.transpose()) * h.transpose();
+  // h W W' h' = h (share share') h'. Each column of h has one block of three that is not zero, the same in both.
+  const Eigen::Vector3d up_I = h.block<3, 1>(at::R, 0);
+  double turn = 0, both = 0, bias = 0;
+  for (Eigen::Index i = 0; i < gain.rows(); ++i) {
+    const double a = up_I.dot(gain.W().template block<3, 1>(at::R, i)), b = up_I.dot(gain.W().template block<3, 1>(at::bg, i));
+    turn += a * a;
+    both += a * b;
+    bias += b * b;
+  }
+  const Eigen::Matrix3d along = up_I * up_I.transpose();
+  out.P.block<3, 3>(at::R, at::R) += turn * along;
+  out.P.block<3, 3>(at::R, at::bg) += both * along;
+  out.P.block<3, 3>(at::bg, at::R) += both * along;
+  out.P.block<3, 3>(at::bg, at::bg) += bias * along;
   return out;
 }
 

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <optional>
 
 #include "kilvo/map/voxel_index.hpp"
@@ -10,50 +12,58 @@
 namespace kilvo {
 namespace {
 
-// Sums around the first point of the cell, so that floats lose nothing.
-struct Cell {
-  VoxelKey key;
-  Eigen::Vector3f first, sum;
-  float count;
-  Eigen::Matrix<float, 6, 1> outer;
+using Float4 = float __attribute__((vector_size(16)));
+using Int4 = int __attribute__((vector_size(16)));
+using Double4 = double __attribute__((vector_size(32)));
+using Long4 = std::int64_t __attribute__((vector_size(32)));
+
+// Sums around the first point of the cell, so that floats lose nothing. One line of the cache.
+struct alignas(64) Cell {
+  Float4 first_point{};    // x y z and nothing
+  Float4 sum_and_count{};  // x y z and how many
+  Float4 outer_a{};        // xx xy xz yy
+  Float4 outer_b{};        // yz zz and nothing of use
+
+  Eigen::Vector3f first() const { return {first_point[0], first_point[1], first_point[2]}; }
+  Eigen::Vector3f sum() const { return {sum_and_count[0], sum_and_count[1], sum_and_count[2]}; }
+  float count() const { return sum_and_count[3]; }
 };
+static_assert(sizeof(Cell) == 64);
 
 PointCluster cluster_of(const Cell& c) {
   PointCluster out;
-  const Eigen::Vector3f m = c.sum / c.count;
-  out.mean = c.first + m;
-  out.count = c.count;
-  out.scatter << c.outer[0] - c.sum.x() * m.x(), c.outer[1] - c.sum.x() * m.y(), c.outer[2] - c.sum.x() * m.z(),
-      c.outer[3] - c.sum.y() * m.y(), c.outer[4] - c.sum.y() * m.z(), c.outer[5] - c.sum.z() * m.z();
+  const Eigen::Vector3f sum = c.sum(), m = sum / c.count();
+  out.mean = c.first() + m;
+  out.count = c.count();
+  out.scatter << c.outer_a[0] - sum.x() * m.x(), c.outer_a[1] - sum.x() * m.y(), c.outer_a[2] - sum.x() * m.z(),
+      c.outer_a[3] - sum.y() * m.y(), c.outer_b[0] - sum.y() * m.z(), c.outer_b[1] - sum.z() * m.z();
   return out;
 }
 
-// A hash table for one sweep: half full at most, 32-bit slots; no larger than the cells need, so that it stays in the inner caches.
+// A hash table for one sweep. It is a quarter full where cells hold a few points each, as they do, and half full at most.
 class CellTable {
  public:
   explicit CellTable(std::size_t points) {
-    slots_.assign(4096, empty);
+    slots_.assign(std::bit_ceil(std::clamp<std::size_t>(points / 2, 1024, 1 << 16)), empty);
     mask_ = slots_.size() - 1;
-    cells_.reserve(points / 2);
+    cells_.reserve(points / 4);
+    keys_.reserve(points / 4);
   }
 
-  void prefetch(VoxelKey key) const { __builtin_prefetch(&slots_[home(key)]); }
-
-  Cell& cell_of(VoxelKey key, const Eigen::Vector3f& p) {
+  // The index of the cell; a new one begins at p (x y z and 0).
+  std::uint32_t index_of(VoxelKey key, const Float4& p) {
     for (std::size_t i = home(key);; i = (i + 1) & mask_) {
-      if (slots_[i] == empty) {
-        slots_[i] = static_cast<std::uint32_t>(cells_.size());
-        cells_.emplace_back(Cell{key, p, Eigen::Vector3f::Zero(), 0, Eigen::Matrix<float, 6, 1>::Zero()});
-        if (2 * cells_.size() > slots_.size()) grow();
-        return cells_.back();
-      }
-      if (cells_[slots_[i]].key == key) return cells_[slots_[i]];
+      const std::uint32_t slot = slots_[i];
+      if (slot == empty) [[unlikely]]
+        return begin_cell(i, key, p);
+      if (keys_[slot] == key) [[likely]]
+        return slot;
     }
   }
 
   std::optional<std::uint32_t> find(VoxelKey key) const {
     for (std::size_t i = home(key); slots_[i] != empty; i = (i + 1) & mask_) {
-      if (cells_[slots_[i]].key == key) return slots_[i];
+      if (keys_[slots_[i]] == key) return slots_[i];
     }
     return std::nullopt;
   }
@@ -64,11 +74,19 @@ class CellTable {
  private:
   static constexpr std::uint32_t empty = 0xffffffff;
   std::size_t home(VoxelKey key) const { return (key * 0x9E3779B97F4A7C15ULL) >> 32 & mask_; }
+  std::uint32_t begin_cell(std::size_t slot, VoxelKey key, const Float4& p) {
+    const auto index = static_cast<std::uint32_t>(cells_.size());
+    slots_[slot] = index;
+    cells_.emplace_back().first_point = p;
+    keys_.push_back(key);
+    if (2 * cells_.size() > slots_.size()) grow();
+    return index;
+  }
   void grow() {
     slots_.assign(2 * slots_.size(), empty);
     mask_ = slots_.size() - 1;
     for (std::uint32_t k = 0; k < cells_.size(); ++k) {
-      std::size_t i = home(cells_[k].key);
+      std::size_t i = home(keys_[k]);
       while (slots_[i] != empty) i = (i + 1) & mask_;
       slots_[i] = k;
     }
@@ -76,6 +94,7 @@ class CellTable {
 
   std::vector<std::uint32_t> slots_;
   std::vector<Cell> cells_;
+  std::vector<VoxelKey> keys_;  // of the cells
   std::size_t mask_;
 };
 
@@ -83,7 +102,7 @@ class CellTable {
 std::vector<Eigen::Vector3d> means_of(const std::vector<Cell>& cells, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
   std::vector<Eigen::Vector3d> means;
   means.reserve(cells.size());
-  for (const Cell& c : cells) means.emplace_back(R * (c.first + c.sum / c.count).cast<double>() + t);
+  for (const Cell& c : cells) means.emplace_back(R * (c.first() + c.sum() / c.count()).cast<double>() + t);
   return means;
 }
 
@@ -109,9 +128,9 @@ std::vector<std::uint32_t> owners_of(const CellTable& table, const Eigen::Matrix
       if (!other) continue;
       const double face = static_cast<double>(side > 0 ? at[axis] + 1 : at[axis]);
       if (std::abs(means[*other][k] - face) > reach) continue;
-      const float best = cells[owner[i]].count;
+      const float best = cells[owner[i]].count();
       // Fuller, or first among equals: no two own each other.
-      if (cells[*other].count > best || (cells[*other].count == best && *other < owner[i])) owner[i] = *other;
+      if (cells[*other].count() > best || (cells[*other].count() == best && *other < owner[i])) owner[i] = *other;
     }
   }
   for (std::uint32_t i = 0; i < cells.size(); ++i) {
@@ -122,47 +141,93 @@ std::vector<std::uint32_t> owners_of(const CellTable& table, const Eigen::Matrix
 
 // The sums of `from`, moved to the first point of `to`.
 void join(const Cell& from, Cell& to) {
-  const Eigen::Vector3f d = from.first - to.first;
-  const auto moved = [&](int i, int j) { return from.sum[i] * d[j] + d[i] * from.sum[j] + from.count * d[i] * d[j]; };
-  Eigen::Matrix<float, 6, 1> shift;
-  shift << moved(0, 0), moved(0, 1), moved(0, 2), moved(1, 1), moved(1, 2), moved(2, 2);
-  to.outer += from.outer + shift;
-  to.sum += from.sum + from.count * d;
-  to.count += from.count;
+  const Eigen::Vector3f d = from.first() - to.first(), sum = from.sum();
+  const float count = from.count();
+  const auto moved = [&](int i, int j) { return sum[i] * d[j] + d[i] * sum[j] + count * d[i] * d[j]; };
+  to.outer_a += from.outer_a + Float4{moved(0, 0), moved(0, 1), moved(0, 2), moved(1, 1)};
+  to.outer_b += from.outer_b + Float4{moved(1, 2), moved(2, 2), 0, 0};
+  const Eigen::Vector3f shift = count * d;
+  to.sum_and_count += from.sum_and_count + Float4{shift.x(), shift.y(), shift.z(), 0};
 }
 
-void add(const Eigen::Vector3f& p, Cell& c) {
-  const Eigen::Vector3f d = p - c.first;
-  c.count += 1;
-  c.sum += d;
-  c.outer[0] += d.x() * d.x();
-  c.outer[1] += d.x() * d.y();
-  c.outer[2] += d.x() * d.z();
-  c.outer[3] += d.y() * d.y();
-  c.outer[4] += d.y() * d.z();
-  c.outer[5] += d.z() * d.z();
+[[gnu::always_inline]] inline void add(const Float4& p, Cell& c) {
+  Float4 d = p - c.first_point;
+  d[3] = 1;
+  c.sum_and_count += d;
+  c.outer_a += Float4{d[0], d[0], d[0], d[1]} * Float4{d[0], d[1], d[2], d[1]};
+  c.outer_b += Float4{d[1], d[2], d[1], d[2]} * Float4{d[2], d[2], d[2], d[2]};
+}
+
+// Cells of the grid: x -> floor(R x + t), R and t in cells.
+struct Grid {
+  Eigen::Matrix3d R;
+  Eigen::Vector3d t;
+};
+
+// floor() of what is below 2^31.
+[[gnu::always_inline]] inline void floor_of(const Double4& x, Long4& out) {
+  const Int4 down = __builtin_convertvector(x, Int4);
+  const Double4 back = __builtin_convertvector(down, Double4);
+  out = __builtin_convertvector(down, Long4) + (x < back);
+}
+
+constexpr std::size_t block = 256;  // points
+
+// The keys of four points at a time; `count` is a multiple of four.
+KILVO_WIDE void keys_of(const float* points, std::size_t count, const Grid& grid, VoxelKey* keys) {
+  constexpr std::int64_t low_bits = (1LL << 21) - 1;
+  const Eigen::Matrix3d& R = grid.R;
+  for (std::size_t i = 0; i < count; i += 4, points += 16) {
+    Float4 a, b, c, d;
+    std::memcpy(&a, points, sizeof(a));
+    std::memcpy(&b, points + 4, sizeof(b));
+    std::memcpy(&c, points + 8, sizeof(c));
+    std::memcpy(&d, points + 12, sizeof(d));
+    const Float4 ab = Float4{a[0], b[0], a[1], b[1]}, cd = Float4{c[0], d[0], c[1], d[1]};
+    const Float4 ab_z = Float4{a[2], b[2], a[3], b[3]}, cd_z = Float4{c[2], d[2], c[3], d[3]};
+    const Double4 x = __builtin_convertvector(Float4{ab[0], ab[1], cd[0], cd[1]}, Double4);
+    const Double4 y = __builtin_convertvector(Float4{ab[2], ab[3], cd[2], cd[3]}, Double4);
+    const Double4 z = __builtin_convertvector(Float4{ab_z[0], ab_z[1], cd_z[0], cd_z[1]}, Double4);
+    Long4 key{};
+    for (int k = 0; k < 3; ++k) {
+      Long4 cell;
+      floor_of(R(k, 0) * x + (R(k, 1) * y + R(k, 2) * z) + grid.t[k], cell);
+      key |= (cell & low_bits) << (21 * k);
+    }
+    for (std::size_t j = 0; j < 4; ++j) keys[i + j] = static_cast<VoxelKey>(key[j]);
+  }
+}
+
+// All points into their cells.
+void gather(std::span<const PointXYZI> points, const Grid& grid, CellTable& table) {
+  std::array<VoxelKey, block> keys;
+  std::array<Float4, 4> last{};  // of a block, which need not be four
+  for (std::size_t first = 0; first < points.size(); first += block) {
+    const std::size_t count = std::min(block, points.size() - first), whole = count & ~std::size_t{3};
+    const float* at = points[first].data();
+    keys_of(at, whole, grid, keys.data());
+    if (whole < count) {
+      std::memcpy(last.data(), at + 4 * whole, (count - whole) * sizeof(Float4));
+      keys_of(reinterpret_cast<const float*>(last.data()), 4, grid, keys.data() + whole);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      Float4 p;
+      std::memcpy(&p, at + 4 * i, sizeof(p));
+      p[3] = 0;
+      const std::uint32_t index = table.index_of(keys[i], p);
+      add(p, table.cells()[index]);
+    }
+  }
 }
 
 }  // namespace
 
 std::vector<PointCluster> downsample(std::span<const PointXYZI> points, const SE3& T_WI, double cell, double reach) {
   CellTable table(points.size());
-  const Eigen::Matrix3d R = T_WI.R.matrix() / cell;
-  const Eigen::Vector3d t = T_WI.p / cell;
-  // So many points wait for the table at once.
-  constexpr std::size_t together = 32;
-  std::array<VoxelKey, together> keys;
-  for (std::size_t first = 0; first < points.size(); first += together) {
-    const auto next = points.subspan(first, std::min(together, points.size() - first));
-    for (std::size_t i = 0; i < next.size(); ++i) {
-      const Eigen::Vector3d w = R * next[i].head<3>().cast<double>() + t;
-      keys[i] = pack_key(fast_floor(w.x()), fast_floor(w.y()), fast_floor(w.z()));
-      table.prefetch(keys[i]);
-    }
-    for (std::size_t i = 0; i < next.size(); ++i) add(next[i].head<3>(), table.cell_of(keys[i], next[i].head<3>()));
-  }
+  const Grid grid{T_WI.R.matrix() / cell, T_WI.p / cell};
+  gather(points, grid, table);
   std::vector<Cell>& cells = table.cells();
-  const std::vector<std::uint32_t> owner = owners_of(table, R, t, std::min(reach / cell, 0.25));
+  const std::vector<std::uint32_t> owner = owners_of(table, grid.R, grid.t, std::min(reach / cell, 0.25));
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (owner[i] != i) join(cells[i], cells[owner[i]]);
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "kilvo/lidar/outer_sum.hpp"
 #include "kilvo/lidar/point_noise.hpp"
 
 namespace kilvo {
@@ -22,10 +23,6 @@ constexpr double robust_cost = 1.014;
 // The thickness test needs a few points to say anything.
 constexpr float thickness_min_count = 4;
 
-// What leaves a plane within one voxel, a picture on a wall, is about as large as half of the voxel: were it smaller, it would not matter,
-// and were it larger, it would be the plane.
-constexpr double bumps_of_a_plane = 4;
-
 // Points looked up at once.
 constexpr std::size_t block = 256;
 
@@ -37,22 +34,6 @@ inline PointToPlaneRow row_of(const Eigen::Vector3d& p_I, const Eigen::Vector3d&
   row.J.head<3>() = p_I.cross(n_I);
   row.J.tail<3>() = n_W;
   return row;
-}
-
-// A += w g g'. Of symmetric sums only the lower triangles are read, but whole columns are faster.
-inline void add_outer(Eigen::Matrix<double, 6, 6>& A, const Eigen::Matrix<double, 6, 1>& g, double w) {
-  for (int j = 0; j < 6; ++j) A.col(j) += (w * g[j]) * g;
-}
-
-// A point that range noise e carries outwards comes to lie in a cell that is seen at a flatter angle and weighs differently from the one
-// that it left: what the rows of a plane say together is off along the normal n by E[w e] / w = sigma^2 (dw / dr) / w, m. `variance`: of
-// one point along n. Along the plane a point moves by the sine of its angle of incidence times e, and the range by the same share of that.
-double pull_of_noise(const Eigen::Vector3d& n, const Eigen::Vector3d& beam, double variance, const LidarConfig& config) {
-  const double range = beam.norm(), cosine = n.dot(beam) / range, sine2 = 1 - cosine * cosine;
-  const double range2 = config.range_noise * config.range_noise, angle2 = config.angle_noise * config.angle_noise;
-  // On a plane at the distance h the cosine is h / r.
-  const double slope = 2 * (angle2 * range - range2 * cosine * cosine / range);
-  return -cosine * sine2 * range2 * slope / variance;
 }
 
 }  // namespace
@@ -144,12 +125,35 @@ LidarModel::Association LidarModel::associate(std::size_t i, const Iterate& at, 
   return found;
 }
 
+// Rows of a block on their way into the sums.
+struct Waiting {
+  std::array<OuterRow, block> rows;
+  std::array<OuterRow, 2 * block> fake;
+  std::size_t row_count = 0, fake_count = 0;
+};
+
 struct LidarModel::Sums {
-  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();  // lower triangles
-  Eigen::Matrix<double, 6, 6> fake = Eigen::Matrix<double, 6, 6>::Zero();
+  PoseCovariance A = PoseCovariance::Zero();  // lower triangles
+  PoseCovariance fake = PoseCovariance::Zero();
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
   double chi2 = 0;
   int rows = 0;
+  Waiting* waiting = nullptr;
+
+  // Of one block, when all its rows are there.
+  void add_up() {
+    OuterSum all, faked;
+    all.add(waiting->rows.data(), waiting->row_count);
+    faked.add(waiting->fake.data(), waiting->fake_count);
+    A = all.lower();
+    fake = faked.lower();
+    for (const OuterRow& row : std::span(waiting->rows).first(waiting->row_count)) {
+      for (std::size_t k = 0; k < 6; ++k) b[static_cast<Eigen::Index>(k)] += row.w * row.r * row.g[k];
+      chi2 += row.w * row.r * row.r;
+    }
+    rows = static_cast<int>(waiting->row_count);
+    waiting = nullptr;
+  }
 
   Sums& operator+=(const Sums& o) {
     A += o.A;
@@ -164,14 +168,12 @@ struct LidarModel::Sums {
 void LidarModel::add_row(std::size_t i, const SE3& T_WI, Sums& sums) {
   Association& a = associations_[i];
   if (a.plane == nullptr) return;
+  Waiting& waiting = *sums.waiting;
   // k rows of one plane share its error: each carries k times its variance, so that together they average it not at all.
   const double variance = a.variance + rows_of_node_[a.node] * a.plane_variance;
   const double z = std::abs(a.row.r) / std::sqrt(a.variance + a.plane_variance);
   a.weight = (z > robust_sigmas ? robust_sigmas / z : 1.0) / (robust_cost * variance);
-  add_outer(sums.A, a.row.J, a.weight);
-  sums.b += a.weight * a.row.r * a.row.J;
-  sums.chi2 += a.weight * a.row.r * a.row.r;
-  ++sums.rows;
+  waiting.rows[waiting.row_count++] = {a.row.J, a.weight, a.row.r};
   if (!first_) return;
   const Eigen::Vector3d p_I = clusters_[i].mean.cast<double>();
   const Eigen::Vector3f other_axis = a.plane->normal.cross(a.plane->axis);
@@ -179,7 +181,7 @@ void LidarModel::add_row(std::size_t i, const SE3& T_WI, Sums& sums) {
     Eigen::Matrix<double, 6, 1> g;
     g.tail<3>() = axis.cast<double>();
     g.head<3>() = p_I.cross(T_WI.R.matrix().transpose() * g.tail<3>());
-    add_outer(sums.fake, g, a.weight * static_cast<double>(tilt));
+    waiting.fake[waiting.fake_count++] = {g, a.weight * static_cast<double>(tilt)};
   }
 }
 
@@ -197,8 +199,11 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
     if (a.plane != nullptr) ++rows_of_node_[a.node];
   }
   Sums sums = workers_.sum(associations_.size(), block, Sums{}, [&](std::size_t first, std::size_t last) {
+    Waiting waiting;
     Sums part;
+    part.waiting = &waiting;
     for (std::size_t i = first; i < last; ++i) add_row(i, T_WI, part);
+    part.add_up();
     return part;
   });
   for (const Association& a : associations_) {
@@ -217,55 +222,6 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   first_ = false;
   project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), info);
   return info;
-}
-
-PoseCovariance LidarModel::systematic() const {
-  using Vector6 = Eigen::Matrix<double, 6, 1>;
-  constexpr std::uint32_t none = 0xffffffff;
-  struct OfPlane {
-    Vector6 pull = Vector6::Zero();  // of its own error on b
-    PoseCovariance bumps = PoseCovariance::Zero();
-    int rows = 0;
-  };
-  std::vector<std::uint32_t> index_of_node(map_.node_capacity(), none);
-  std::vector<OfPlane> planes;
-  Vector6 pull = Vector6::Zero();
-  for (std::size_t i = 0; i < associations_.size(); ++i) {
-    const Association& a = associations_[i];
-    if (a.plane == nullptr) continue;
-    std::uint32_t& index = index_of_node[a.node];
-    if (index == none) {
-      index = static_cast<std::uint32_t>(planes.size());
-      planes.emplace_back();
-    }
-    OfPlane& plane = planes[index];
-    ++plane.rows;
-    plane.pull += a.weight * std::sqrt(a.plane_variance) * a.row.J;
-    add_outer(plane.bumps, a.row.J, a.weight * a.weight * static_cast<double>(a.plane->roughness_variance));
-    // A point that is alone in its cell weighs as it does itself.
-    const double count = clusters_[i].count, together = 1 - 1 / count;
-    pull += a.weight * together * pull_of_noise(a.n_I, clusters_[i].mean.cast<double>() - p_IL_, a.variance * count, config_) * a.row.J;
-  }
-  PoseCovariance M = pull * pull.transpose();
-  for (const OfPlane& plane : planes) M += plane.pull * plane.pull.transpose() + std::max(1.0, plane.rows / bumps_of_a_plane) * plane.bumps;
-  const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
-  return known.transpose() * M.selfadjointView<Eigen::Lower>() * known;
-}
-
-std::vector<EpochInformation> LidarModel::by_epoch() const {
-  std::vector<EpochInformation> out;
-  for (const Association& a : associations_) {
-    if (a.plane == nullptr) continue;
-    auto it = std::find_if(out.begin(), out.end(), [&a](const EpochInformation& e) { return e.epoch == a.epoch; });
-    if (it == out.end()) it = out.insert(out.end(), EpochInformation{a.epoch});
-    add_outer(it->A, a.row.J, a.weight);
-  }
-  const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
-  for (EpochInformation& e : out) {
-    e.A.triangularView<Eigen::StrictlyUpper>() = e.A.transpose();
-    e.A = (known.transpose() * e.A * known).eval();
-  }
-  return out;
 }
 
 std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL,

@@ -24,6 +24,52 @@ Corner corner_at(const Eigen::Vector2d& pixel, int level) {
   return {x, y, {c.x() - x, c.y() - y}};
 }
 
+// The pixels of a template with one more on each side, for the gradient.
+constexpr int wide = Template::size + 2;
+constexpr std::size_t wide_count = (wide * wide + lanes - 1) / lanes * lanes;
+using Wide = std::array<float, wide_count>;
+
+// A template's pixel (x, y) lies at centre + (x step_x + y step_y) / (1 + c'(x, y)) of a patch.
+struct Placing {
+  float centre[2], step_x[2], step_y[2], c[2];
+};
+
+// Bilinear, of each pixel. The places first, then their four neighbours, then what is between them: only the second step is not done
+// for many at once.
+KILVO_WIDE void sample_all(const std::uint8_t* pixels, const Placing& placing, Wide& out) {
+  constexpr float reach = half + 1;
+  alignas(32) std::array<float, wide_count> a, b;
+  alignas(32) std::array<std::int32_t, wide_count> corner;
+  alignas(32) std::array<std::uint8_t, wide_count> upper0, upper1, lower0, lower1;
+  alignas(32) std::array<float, wide_count> xs, ys;
+  for (int k = 0; k < static_cast<int>(wide_count); ++k) {
+    const int clamped = std::min(k, wide * wide - 1);
+    xs[static_cast<std::size_t>(k)] = static_cast<float>(clamped % wide) - reach;
+    ys[static_cast<std::size_t>(k)] = static_cast<float>(clamped / wide) - reach;
+  }
+  for (std::size_t k = 0; k < wide_count; ++k) {
+    const float x = xs[k], y = ys[k], depth = 1 + placing.c[0] * x + placing.c[1] * y;
+    const float u = placing.centre[0] + (x * placing.step_x[0] + y * placing.step_y[0]) / depth;
+    const float v = placing.centre[1] + (x * placing.step_x[1] + y * placing.step_y[1]) / depth;
+    const auto iu = static_cast<std::int32_t>(u), iv = static_cast<std::int32_t>(v);
+    a[k] = u - static_cast<float>(iu);
+    b[k] = v - static_cast<float>(iv);
+    corner[k] = iv * Patch::size + iu;
+  }
+  for (std::size_t k = 0; k < wide_count; ++k) {
+    const std::uint8_t* const at = pixels + corner[k];
+    upper0[k] = at[0];
+    upper1[k] = at[1];
+    lower0[k] = at[Patch::size];
+    lower1[k] = at[Patch::size + 1];
+  }
+  for (std::size_t k = 0; k < wide_count; ++k) {
+    const float top = static_cast<float>(upper0[k]) + a[k] * static_cast<float>(upper1[k] - upper0[k]);
+    const float bottom = static_cast<float>(lower0[k]) + a[k] * static_cast<float>(lower1[k] - lower0[k]);
+    out[k] = top + b[k] * (bottom - top);
+  }
+}
+
 }  // namespace
 
 std::optional<Patch> cut_patch(std::span<const GreyImage> pyramid, const Eigen::Vector2d& pixel) {
@@ -68,8 +114,6 @@ std::optional<Template> warp(const Observation& from, const PlaneWarp& plane, in
   const Eigen::Vector2f centre = corner_at(from.pixel.cast<double>(), source).centre.cast<float>();
   const Eigen::Matrix2f step = (plane.A * (static_cast<double>(1 << level) / (1 << source))).cast<float>();
   const Eigen::Vector2f c = (plane.c * (1 << level)).cast<float>();
-  // One pixel more on each side, for the gradient.
-  constexpr int wide = Template::size + 2;
   const float reach = half + 1;
   constexpr float most = 0.3F;
   const float nearest = 1 - reach * (std::abs(c.x()) + std::abs(c.y()));
@@ -77,15 +121,8 @@ std::optional<Template> warp(const Observation& from, const PlaneWarp& plane, in
   const Eigen::Vector2f extent = reach / nearest * (step.col(0).cwiseAbs() + step.col(1).cwiseAbs());
   if (((centre - extent).array() < 0).any() || ((centre + extent).array() > Patch::size - 1.001F).any()) return std::nullopt;
   const auto& pixels = from.patch.pixels[static_cast<std::size_t>(source)];
-  std::array<float, wide * wide> values;
-  for (int j = 0; j < wide; ++j) {
-    const float y = static_cast<float>(j) - reach;
-    for (int i = 0; i < wide; ++i) {
-      const float x = static_cast<float>(i) - reach;
-      const Eigen::Vector2f at = centre + (x * step.col(0) + y * step.col(1)) / (1 + c.x() * x + c.y() * y);
-      values[static_cast<std::size_t>(j * wide + i)] = sample(pixels.data(), Patch::size, at.x(), at.y());
-    }
-  }
+  alignas(32) Wide values;
+  sample_all(pixels.data(), {{centre.x(), centre.y()}, {step(0, 0), step(1, 0)}, {step(0, 1), step(1, 1)}, {c.x(), c.y()}}, values);
   Template out;
   for (int j = 0; j < Template::size; ++j) {
     for (int i = 0; i < Template::size; ++i) {

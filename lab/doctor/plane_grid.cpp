@@ -1,7 +1,7 @@
 #include "lab/doctor/plane_grid.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <cmath>
+#include <algorithm>
 
 namespace kilvo::lab {
 namespace {
@@ -11,18 +11,57 @@ constexpr double refit = 1.25;  // times as many points as at the last fit
 constexpr double flat = 0.08;   // of the middle to the smallest eigenvalue
 constexpr double most = 20000;  // points of a voxel
 
+constexpr std::size_t first_slots = 1024;
+
+// floor() without a call.
+Eigen::Vector3d floor_of(const Eigen::Vector3d& x) {
+  Eigen::Vector3d out;
+  for (int i = 0; i < 3; ++i) {
+    const auto down = static_cast<double>(static_cast<std::int64_t>(x[i]));
+    out[i] = down > x[i] ? down - 1 : down;
+  }
+  return out;
+}
+
 }  // namespace
 
-std::int64_t PlaneGrid::key(const Eigen::Vector3d& p) const {
-  const auto part = [this](double x) { return (static_cast<std::int64_t>(std::floor(x / side_)) + (1 << 20)) & ((1 << 21) - 1); };
-  return (part(p.x()) << 42) | (part(p.y()) << 21) | part(p.z());
+PlaneGrid::PlaneGrid(double side) : side_(side), slots_(first_slots) {}
+
+std::uint64_t PlaneGrid::key_of(const Eigen::Vector3d& cell) {
+  const auto part = [](double x) { return static_cast<std::uint64_t>(static_cast<std::int64_t>(x) + (1 << 20)) & ((1 << 21) - 1); };
+  return (part(cell.x()) << 42) | (part(cell.y()) << 21) | part(cell.z());
+}
+
+// Where the voxel of this key is, or would be.
+std::size_t PlaneGrid::slot_of(std::uint64_t key) const {
+  const std::size_t mask = slots_.size() - 1;
+  std::size_t i = (key * 0x9E3779B97F4A7C15ULL >> 32) & mask;
+  while (slots_[i].voxel != none && slots_[i].key != key) i = (i + 1) & mask;
+  return i;
+}
+
+void PlaneGrid::grow() {
+  std::vector<Slot> old(2 * slots_.size());
+  old.swap(slots_);
+  for (const Slot& slot : old) {
+    if (slot.voxel != none) slots_[slot_of(slot.key)] = slot;
+  }
 }
 
 void PlaneGrid::insert(const Eigen::Vector3d& p) {
-  Voxel& v = voxels_[key(p)];
+  const Eigen::Vector3d cell = floor_of(p / side_);
+  const std::uint64_t key = key_of(cell);
+  Slot& slot = slots_[slot_of(key)];
+  const bool is_new = slot.voxel == none;
+  if (is_new) {
+    slot = {key, static_cast<std::uint32_t>(voxels_.size())};
+    voxels_.emplace_back();
+  }
+  Voxel& v = voxels_[slot.voxel];
+  if (is_new && 2 * voxels_.size() > slots_.size()) grow();
   if (v.n >= most) return;
   // About the voxel's corner, so that squares stay small.
-  const Eigen::Vector3d d = p - side_ * (p / side_).array().floor().matrix();
+  const Eigen::Vector3d d = p - side_ * cell;
   v.n += 1;
   v.sum += d;
   v.squares += d * d.transpose();
@@ -39,10 +78,12 @@ void PlaneGrid::fit(Voxel& v, const Eigen::Vector3d& corner) const {
 }
 
 const GridPlane* PlaneGrid::find(const Eigen::Vector3d& p) {
-  const auto it = voxels_.find(key(p));
-  if (it == voxels_.end() || it->second.n < fewest) return nullptr;
-  Voxel& v = it->second;
-  if (v.n >= refit * v.fitted_n) fit(v, side_ * (p / side_).array().floor().matrix());
+  const Eigen::Vector3d cell = floor_of(p / side_);
+  const Slot& slot = slots_[slot_of(key_of(cell))];
+  if (slot.voxel == none) return nullptr;
+  Voxel& v = voxels_[slot.voxel];
+  if (v.n < fewest) return nullptr;
+  if (v.n >= refit * v.fitted_n) fit(v, side_ * cell);
   return v.planar ? &v.plane : nullptr;
 }
 

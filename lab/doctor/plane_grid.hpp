@@ -2,7 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <unordered_map>
+#include <cstdint>
+#include <vector>
 
 namespace kilvo::lab {
 
@@ -13,24 +14,33 @@ struct GridPlane {
 
 class PlaneGrid {
  public:
-  explicit PlaneGrid(double side) : side_(side) {}
+  explicit PlaneGrid(double side);
   void insert(const Eigen::Vector3d& p);
-  /// The plane in the voxel of this point, nullptr without one.
+  /// The plane in the voxel of this point, nullptr without one. Good until the next insert().
   const GridPlane* find(const Eigen::Vector3d& p);
 
  private:
   struct Voxel {
     double n = 0, fitted_n = 0;
+    bool planar = false;
+    GridPlane plane;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-    GridPlane plane;
-    bool planar = false;
   };
-  std::int64_t key(const Eigen::Vector3d& p) const;
+  static constexpr std::uint32_t none = 0xffffffff;
+  // Open addressing, half full at most.
+  struct Slot {
+    std::uint64_t key = 0;
+    std::uint32_t voxel = none;
+  };
+  static std::uint64_t key_of(const Eigen::Vector3d& cell);
+  std::size_t slot_of(std::uint64_t key) const;
+  void grow();
   void fit(Voxel& voxel, const Eigen::Vector3d& corner) const;
 
   double side_;
-  std::unordered_map<std::int64_t, Voxel> voxels_;
+  std::vector<Slot> slots_;
+  std::vector<Voxel> voxels_;
 };
 
 }  // namespace kilvo::lab

@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "lab/doctor/plane_grid.hpp"
 
@@ -21,6 +22,61 @@ constexpr double velocity_change = 1.0;  // m/s from sweep to sweep, standard de
 
 using Vector9 = Eigen::Matrix<double, 9, 1>;
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
+
+using Double4 = double __attribute__((vector_size(32)));
+
+// One point's row: its derivative J over (turn, position, velocity), weight and residual.
+struct Row {
+  double J[9];
+  double weight, r;
+};
+
+// Lower triangle of sum w J J', and sum w r J.
+struct Normal {
+  double columns[4][8] = {};  // rows 0 to 7 of the first four columns
+  double corner[4][4] = {};   // rows 4 to 7 of the next four
+  double last[9] = {};        // row 8
+  double g[9] = {};
+
+  Matrix9 H() const {
+    Matrix9 out = Matrix9::Zero();
+    for (int j = 0; j < 8; ++j) {
+      for (int i = j; i < 8; ++i) out(i, j) = j < 4 ? columns[j][i] : corner[j - 4][i - 4];
+    }
+    for (int j = 0; j < 9; ++j) out(8, j) = last[j];
+    return out;
+  }
+};
+
+[[gnu::always_inline]] inline void load(Double4& to, const double* from) { std::memcpy(&to, from, sizeof(to)); }
+
+// sums += s x, of four
+[[gnu::always_inline]] inline void add(double* sums, double s, const Double4& x) {
+  Double4 sum;
+  load(sum, sums);
+  sum += s * x;
+  std::memcpy(sums, &sum, sizeof(sum));
+}
+
+KILVO_WIDE void add_rows(const Row* rows, std::size_t count, Normal& to) {
+  for (const Row* row = rows; row != rows + count; ++row) {
+    Double4 upper, lower;
+    load(upper, row->J);
+    load(lower, row->J + 4);
+    upper *= row->weight;
+    lower *= row->weight;
+    for (int j = 0; j < 4; ++j) {
+      add(to.columns[j], row->J[j], upper);
+      add(to.columns[j] + 4, row->J[j], lower);
+      add(to.corner[j], row->J[4 + j], lower);
+    }
+    const double w8 = row->weight * row->J[8], wr = row->weight * row->r;
+    for (int j = 0; j < 9; ++j) {
+      to.last[j] += w8 * row->J[j];
+      to.g[j] += wr * row->J[j];
+    }
+  }
+}
 
 class Odometry {
  public:
@@ -94,13 +150,13 @@ class Odometry {
     const Eigen::Vector3d expected = pose.v_W;
     double scale = 0.1;
     for (int k = 0; k < iterations; ++k) {
-      Matrix9 H = Matrix9::Zero();
-      Vector9 g = Vector9::Zero();
       std::vector<double> distances;
+      rows_.clear();
+      const Eigen::Matrix3d R = pose.T_WL.R.matrix(), back = R.transpose();
       const std::size_t stride = std::max<std::size_t>(1, points_.size() / used);
       for (std::size_t i = 0; i < points_.size(); i += stride) {
         const Point& p = points_[i];
-        const Eigen::Vector3d arm = pose.T_WL.R * p.p;
+        const Eigen::Vector3d arm = R * p.p;
         const Eigen::Vector3d at = arm + pose.T_WL.p + p.dt * pose.v_W;
         const GridPlane* plane = plane_at(at, p.p.norm());
         if (plane == nullptr) continue;
@@ -109,11 +165,13 @@ class Odometry {
         distances.push_back(std::abs(r));
         const double noise = plane->variance + sensor_noise * sensor_noise;
         const double weight = 1 / (noise * (1 + r * r / (4 * (scale * scale + noise))));
-        Vector9 J;
-        J << pose.T_WL.R.inverse() * (arm.cross(plane->n)), plane->n, p.dt * plane->n;
-        H += weight * J * J.transpose();
-        g += weight * r * J;
+        const Eigen::Vector3d a = back * (arm.cross(plane->n)), &n = plane->n;
+        rows_.push_back({{a.x(), a.y(), a.z(), n.x(), n.y(), n.z(), p.dt * n.x(), p.dt * n.y(), p.dt * n.z()}, weight, r});
       }
+      Normal normal;
+      add_rows(rows_.data(), rows_.size(), normal);
+      Matrix9 H = normal.H();
+      Vector9 g(normal.g);
       if (distances.size() < enough) return false;
       pose.weakest = 3 * Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(H.block<3, 3>(3, 3)).eigenvalues()[0] / H.block<3, 3>(3, 3).trace();
       H.block<3, 3>(6, 6).diagonal().array() += 1 / (velocity_change * velocity_change);
@@ -162,6 +220,7 @@ class Odometry {
   Deskew deskew_;
   PlaneGrid fine_{fine}, coarse_{coarse};
   std::vector<Point> points_;
+  std::vector<Row> rows_;  // of one iteration
   SweepPose last_;
   Eigen::Vector3d omega_ = Eigen::Vector3d::Zero();
   bool first_ = true;

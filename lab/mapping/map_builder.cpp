@@ -11,7 +11,6 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t chunk_size = 32768;  // voxels
 constexpr std::size_t table_count = 256;
 constexpr std::size_t first_slots = 16;
 constexpr int axis_bits = 21;
@@ -21,7 +20,7 @@ constexpr double fractions = 65536;
 constexpr std::uint16_t most_averaged = 32;
 constexpr float most_remembered = 64;  // as heavy as so many of the next colour; more would be lost in the rounding of the mean
 constexpr float least_weight = 1e-6F, most_weight = 1e6F;
-constexpr std::size_t block_size = 32;  // points on their way at a time, so that their cache misses overlap
+constexpr std::size_t block_size = 32;
 
 /// Spreads neighbouring voxels over all 64 bits (the finaliser of MurmurHash3).
 std::uint64_t hash(std::uint64_t key) {
@@ -44,67 +43,105 @@ std::uint16_t upper_half(float x) { return static_cast<std::uint16_t>((std::bit_
 
 float from_upper_half(std::uint16_t half) { return std::bit_cast<float>(static_cast<std::uint32_t>(half) << 16U); }
 
+// Where points lie: their voxels along the three axes and how far in.
+struct Places {
+  alignas(32) std::array<std::array<std::int32_t, block_size>, 3> index, within;
+  alignas(32) std::array<std::int32_t, block_size> usable;
+};
+
+KILVO_WIDE void place_all(const float* points_W, std::size_t count, double resolution, Places& out) {
+  out.usable.fill(1);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const double at = static_cast<double>(points_W[4 * i + axis]) / resolution + axis_offset;
+      const bool inside = at >= 0 && at < 2 * axis_offset;  // false when it is not a number
+      const double x = inside ? at : 0;
+      const auto index = static_cast<std::int32_t>(x);
+      out.index[axis][i] = index;
+      out.within[axis][i] = static_cast<std::int32_t>((x - static_cast<double>(index)) * fractions);
+      out.usable[i] &= inside ? 1 : 0;
+    }
+  }
+}
+
 }  // namespace
 
 MapBuilder::MapBuilder(const MappingConfig& config)
     : resolution_(config.resolution),
       keep_(config.keep),
       max_points_(static_cast<std::size_t>(std::max(0, config.max_points))),
+      number_bits_(static_cast<unsigned>(std::bit_width(max_points_ + 1))),
       tables_(table_count) {
   if (!(std::isfinite(resolution_) && resolution_ > 0)) throw std::invalid_argument("map.resolution must be a positive length in metres");
   for (Table& table : tables_) grow(table);
 }
 
-void MapBuilder::add(std::span<const Eigen::Vector4f> points_W) {
-  if (!keep_) return;
+struct MapBuilder::Block {
   std::array<Voxel, block_size> samples;
   std::array<std::uint64_t, block_size> hashes;
+  std::array<std::uint32_t, block_size> from;  // of which point
+};
+
+void MapBuilder::add(std::span<const Eigen::Vector4f> points_W) {
+  if (!keep_) return;
+  Block block;
   for (std::size_t begin = 0; begin < points_W.size(); begin += block_size) {
-    const auto block = points_W.subspan(begin, std::min(block_size, points_W.size() - begin));
-    std::size_t count = 0;
-    for (const Eigen::Vector4f& point : block) {
-      if (!locate(point, samples[count])) continue;
-      hashes[count] = hash(samples[count].key);
-      __builtin_prefetch(&first_slot(hashes[count]));
-      ++count;
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t number = first_slot(hashes[i]);
-      if (number != 0) __builtin_prefetch(&voxel(number - 1));
-    }
-    for (std::size_t i = 0; i < count; ++i) merge(samples[i], hashes[i]);
-    dropped_ += block.size() - count;
+    const std::size_t size = std::min(block_size, points_W.size() - begin), count = locate(&points_W[begin], size, block);
+    prefetch(block, count);
+    for (std::size_t i = 0; i < count; ++i) merge(block.samples[i], block.hashes[i]);
+    dropped_ += size - count;
   }
 }
 
-/// The voxel that holds this point alone; false when there is none.
-bool MapBuilder::locate(const Eigen::Vector4f& point_W, Voxel& sample) const {
-  if (!std::isfinite(point_W[3])) return false;
-  sample.key = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double x = static_cast<double>(point_W[axis]) / resolution_ + axis_offset;
-    if (!(x >= 0 && x < 2 * axis_offset)) return false;  // also when it is not a number
-    const auto index = static_cast<std::uint64_t>(x);
-    sample.key |= index << (axis * axis_bits);
-    sample.position[axis] = static_cast<std::uint16_t>((x - static_cast<double>(index)) * fractions);
+/// The voxels that hold each of these points alone; how many, since for some there is none.
+std::size_t MapBuilder::locate(const Eigen::Vector4f* points_W, std::size_t count, Block& block) const {
+  Places places;
+  place_all(points_W->data(), count, resolution_, places);
+  std::size_t located = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (places.usable[i] == 0 || !std::isfinite(points_W[i][3])) continue;
+    Voxel& sample = block.samples[located];
+    sample.key = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      sample.key |= static_cast<std::uint64_t>(places.index[axis][i]) << (axis * axis_bits);
+      sample.position[axis] = static_cast<std::uint16_t>(places.within[axis][i]);
+    }
+    sample.count = 1;
+    sample.intensity = points_W[i][3];
+    block.hashes[located] = hash(sample.key);
+    block.from[located] = static_cast<std::uint32_t>(i);
+    const Table& table = tables_[block.hashes[located] % table_count];
+    __builtin_prefetch(&table.slots[block.hashes[located] >> table.shift]);
+    ++located;
   }
-  sample.count = 1;
-  sample.intensity = point_W[3];
-  return true;
+  return located;
+}
+
+/// Asks for the voxels that the tables seem to have for these.
+void MapBuilder::prefetch(const Block& block, std::size_t count) const {
+  for (std::size_t i = 0; i < count; ++i) {
+    const Table& table = tables_[block.hashes[i] % table_count];
+    const std::uint32_t tag = tag_of(block.hashes[i]);
+    std::size_t place = block.hashes[i] >> table.shift;
+    while (table.slots[place] != 0 && (table.slots[place] & ~number_mask()) != tag) place = (place + 1) & (table.slots.size() - 1);
+    if (table.slots[place] != 0) __builtin_prefetch(&voxel((table.slots[place] & number_mask()) - 1));
+  }
 }
 
 /// Where the table has the voxel of this key, or is empty when it has none.
 std::size_t MapBuilder::slot_of(const Table& table, std::uint64_t key, std::uint64_t hashed) const {
-  std::size_t place = hashed >> table.shift;
-  while (table.slots[place] != 0 && voxel(table.slots[place] - 1).key != key) place = (place + 1) & (table.slots.size() - 1);
-  return place;
+  const std::uint32_t tag = tag_of(hashed);
+  for (std::size_t place = hashed >> table.shift;; place = (place + 1) & (table.slots.size() - 1)) {
+    const std::uint32_t slot = table.slots[place];
+    if (slot == 0 || ((slot & ~number_mask()) == tag && voxel((slot & number_mask()) - 1).key == key)) return place;
+  }
 }
 
 void MapBuilder::merge(const Voxel& sample, std::uint64_t hashed) {
   Table& table = tables_[hashed % table_count];
   const std::size_t place = slot_of(table, sample.key, hashed);
   if (table.slots[place] != 0) {
-    Voxel& known = voxel(table.slots[place] - 1);
+    Voxel& known = voxel((table.slots[place] & number_mask()) - 1);
     if (known.count == most_averaged) return;
     ++known.count;
     const float share = 1.0F / static_cast<float>(known.count);
@@ -117,25 +154,34 @@ void MapBuilder::merge(const Voxel& sample, std::uint64_t hashed) {
     return;
   }
   append(sample);
-  table.slots[place] = static_cast<std::uint32_t>(size_);
+  table.slots[place] = tag_of(hashed) | static_cast<std::uint32_t>(size_);
   if (++table.used > table.limit) grow(table);
 }
 
 void MapBuilder::colour(std::span<const ColouredPoint> points) {
-  for (const ColouredPoint& point : points) {
-    Voxel sample;
-    if (!(point.weight > 0) || !locate(point.p_W.homogeneous(), sample)) continue;
-    const std::uint64_t hashed = hash(sample.key);
-    const Table& table = tables_[hashed % table_count];
-    const std::uint32_t number = table.slots[slot_of(table, sample.key, hashed)];
-    if (number == 0) continue;
-    Colour& known = colour_at(number - 1);
-    const float weight = std::clamp(point.weight, least_weight, most_weight), before = from_upper_half(known.weight);
-    if (known.weight == 0) ++coloured_;
-    const float share = weight / (before + weight);
-    for (std::size_t i = 0; i < 3; ++i) known.rgb[i] = moved(known.rgb[i], static_cast<std::uint16_t>(256 * point.rgb[i]), share);
-    known.weight = upper_half(std::max(before, std::min(before + weight, most_remembered * weight)));
+  Block block;
+  std::array<Eigen::Vector4f, block_size> places;
+  for (std::size_t begin = 0; begin < points.size(); begin += block_size) {
+    const auto some = points.subspan(begin, std::min(block_size, points.size() - begin));
+    for (std::size_t i = 0; i < some.size(); ++i) places[i] = some[i].p_W.homogeneous();
+    const std::size_t count = locate(places.data(), some.size(), block);
+    prefetch(block, count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const ColouredPoint& point = some[block.from[i]];
+      if (!(point.weight > 0)) continue;
+      const Table& table = tables_[block.hashes[i] % table_count];
+      const std::uint32_t slot = table.slots[slot_of(table, block.samples[i].key, block.hashes[i])];
+      if (slot != 0) mix(point, colour_at((slot & number_mask()) - 1));
+    }
   }
+}
+
+void MapBuilder::mix(const ColouredPoint& point, Colour& known) {
+  const float weight = std::clamp(point.weight, least_weight, most_weight), before = from_upper_half(known.weight);
+  if (known.weight == 0) ++coloured_;
+  const float share = weight / (before + weight);
+  for (std::size_t i = 0; i < 3; ++i) known.rgb[i] = moved(known.rgb[i], static_cast<std::uint16_t>(256 * point.rgb[i]), share);
+  known.weight = upper_half(std::max(before, std::min(before + weight, most_remembered * weight)));
 }
 
 void MapBuilder::append(const Voxel& sample) {
@@ -150,22 +196,13 @@ void MapBuilder::grow(Table& table) {
   table.slots.assign(slots, 0);
   table.shift = 64 - std::countr_zero(slots);
   table.limit = static_cast<std::size_t>(largest_load(static_cast<std::size_t>(&table - tables_.data())) * static_cast<double>(slots));
-  for (const std::uint32_t number : old) {
-    if (number == 0) continue;
-    std::size_t place = hash(voxel(number - 1).key) >> table.shift;
+  for (const std::uint32_t slot : old) {
+    if (slot == 0) continue;
+    std::size_t place = hash(voxel((slot & number_mask()) - 1).key) >> table.shift;
     while (table.slots[place] != 0) place = (place + 1) & (slots - 1);
-    table.slots[place] = number;
+    table.slots[place] = slot;
   }
 }
-
-const std::uint32_t& MapBuilder::first_slot(std::uint64_t hashed) const {
-  const Table& table = tables_[hashed % table_count];
-  return table.slots[hashed >> table.shift];
-}
-
-const MapBuilder::Voxel& MapBuilder::voxel(std::size_t i) const { return chunks_[i / chunk_size][i % chunk_size]; }
-
-MapBuilder::Voxel& MapBuilder::voxel(std::size_t i) { return chunks_[i / chunk_size][i % chunk_size]; }
 
 MapBuilder::Colour& MapBuilder::colour_at(std::size_t i) {
   const std::size_t chunk = i / chunk_size;

@@ -64,6 +64,8 @@ class MapBuilder {
   std::size_t memory_bytes() const;
 
  private:
+  static constexpr std::size_t chunk_size = 32768;  // voxels
+
   struct Voxel {
     std::uint64_t key;          // three indices of 21 bits
     std::uint16_t position[3];  // the mean within the voxel, in 1/65536 of its edge
@@ -76,7 +78,8 @@ class MapBuilder {
     std::uint16_t weight;  // of the mean: the upper half of a float; 0 without colour
   };
 
-  /// Open addressing: number of a voxel + 1, 0 where empty.
+  /// Open addressing: number of a voxel + 1, 0 where empty. The bits that no number needs hold some of the hash, so that other voxels on
+  /// the way need not be looked at.
   struct Table {
     std::vector<std::uint32_t> slots;
     std::size_t used = 0;
@@ -84,19 +87,25 @@ class MapBuilder {
     int shift = 64;         // a hash >> shift is a slot
   };
 
-  bool locate(const Eigen::Vector4f& point_W, Voxel& sample) const;
+  /// Points on their way, so many at a time that their cache misses overlap.
+  struct Block;
+  std::size_t locate(const Eigen::Vector4f* points_W, std::size_t count, Block& block) const;
+  void prefetch(const Block& block, std::size_t count) const;
+  std::uint32_t tag_of(std::uint64_t hashed) const { return static_cast<std::uint32_t>(hashed >> 8U << number_bits_); }
+  std::uint32_t number_mask() const { return (std::uint32_t{1} << number_bits_) - 1; }
   std::size_t slot_of(const Table& table, std::uint64_t key, std::uint64_t hashed) const;
   void merge(const Voxel& sample, std::uint64_t hashed);
+  void mix(const ColouredPoint& point, Colour& known);
   void append(const Voxel& sample);
   void grow(Table& table);
-  const std::uint32_t& first_slot(std::uint64_t hashed) const;
-  const Voxel& voxel(std::size_t i) const;
-  Voxel& voxel(std::size_t i);
+  const Voxel& voxel(std::size_t i) const { return chunks_[i / chunk_size][i % chunk_size]; }
+  Voxel& voxel(std::size_t i) { return chunks_[i / chunk_size][i % chunk_size]; }
   Colour& colour_at(std::size_t i);
 
   double resolution_;
   bool keep_;
   std::size_t max_points_;
+  unsigned number_bits_;  // of a slot
   std::size_t size_ = 0;
   std::size_t coloured_ = 0;
   std::uint64_t dropped_ = 0, left_out_ = 0;

@@ -1,6 +1,7 @@
 #include "lab/messages/point_cloud2.hpp"
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "lab/messages/cloud_layout.hpp"
@@ -26,11 +27,26 @@ bool read_geometry(const CloudLayout& cloud, std::vector<LidarPoint>& points) {
   const CloudField* z = cloud.find("z");
   if (x == nullptr || y == nullptr || z == nullptr) return false;
   points.resize(cloud.size());
+  const CloudField* intensity = cloud.find("intensity");
+  if (intensity == nullptr) intensity = cloud.find("reflectivity");
+  const auto is_plain = [&](const CloudField* field) { return !cloud.big_endian && field->type == ScalarType::float32; };
+  if (intensity != nullptr && is_plain(x) && is_plain(y) && is_plain(z) && is_plain(intensity)) {
+    // As nearly all drivers have it: in one pass.
+    LidarPoint* p = points.data();
+    for (std::size_t row = 0; row < cloud.height; ++row) {
+      const std::uint8_t* at = cloud.data.data() + row * cloud.row_step;
+      for (std::size_t column = 0; column < cloud.width; ++column, at += cloud.point_step, ++p) {
+        std::memcpy(&p->x, at + x->offset, sizeof(float));
+        std::memcpy(&p->y, at + y->offset, sizeof(float));
+        std::memcpy(&p->z, at + z->offset, sizeof(float));
+        std::memcpy(&p->intensity, at + intensity->offset, sizeof(float));
+      }
+    }
+    return true;
+  }
   read_column(cloud, *x, [&](std::size_t i, auto value) { points[i].x = static_cast<float>(value); });
   read_column(cloud, *y, [&](std::size_t i, auto value) { points[i].y = static_cast<float>(value); });
   read_column(cloud, *z, [&](std::size_t i, auto value) { points[i].z = static_cast<float>(value); });
-  const CloudField* intensity = cloud.find("intensity");
-  if (intensity == nullptr) intensity = cloud.find("reflectivity");
   if (intensity != nullptr)
     read_column(cloud, *intensity, [&](std::size_t i, auto value) { points[i].intensity = static_cast<float>(value); });
   return true;

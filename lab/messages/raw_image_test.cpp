@@ -45,6 +45,23 @@ TEST(DecodeImage, ColoursComeOutRedGreenBlue) {
   EXPECT_EQ(pixels_of(message(1, 1, "bgra8", 4, {30, 20, 10, 5}), 3), (Pixels{10, 20, 30}));
 }
 
+TEST(DecodeImage, ManyPixelsInARowComeOutRedGreenBlue) {
+  // Of all lengths, since many bytes are turned at once; with and without padding.
+  for (std::uint32_t width = 1; width < 40; ++width) {
+    for (const std::uint32_t padding : {0U, 2U}) {
+      const std::uint32_t height = 3, step = 3 * width + padding;
+      Pixels blue_first(height * step), expected;
+      for (std::size_t i = 0; i < blue_first.size(); ++i) blue_first[i] = static_cast<std::uint8_t>(7 * i + 3);
+      for (std::size_t y = 0; y < height; ++y) {
+        for (std::size_t x = 0; x < width; ++x) {
+          for (const std::size_t channel : {2U, 1U, 0U}) expected.push_back(blue_first[y * step + 3 * x + channel]);
+        }
+      }
+      ASSERT_EQ(pixels_of(message(width, height, "bgr8", step, blue_first), 3), expected) << width;
+    }
+  }
+}
+
 TEST(DecodeImage, AUniformMosaicGivesAUniformColourInEveryArrangement) {
   // Red 200, green 100, blue 50 everywhere: each arrangement puts them at its own places of the 2x2 block.
   const std::array<std::pair<std::string, std::array<std::uint8_t, 4>>, 4> arrangements{{{"bayer_rggb8", {200, 100, 100, 50}},

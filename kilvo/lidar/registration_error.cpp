@@ -1,0 +1,82 @@
+// What a registration says of the map's errors, which the next sweeps will meet again.
+#include <algorithm>
+#include <cmath>
+
+#include "kilvo/lidar/outer_sum.hpp"
+#include "kilvo/lidar/point_to_plane.hpp"
+
+namespace kilvo {
+namespace {
+
+// What leaves a plane within one voxel, a picture on a wall, is about as large as half of the voxel: were it smaller, it would not matter,
+// and were it larger, it would be the plane.
+constexpr double bumps_of_a_plane = 4;
+
+// A point that range noise e carries outwards comes to lie in a cell that is seen at a flatter angle and weighs differently from the one
+// that it left: what the rows of a plane say together is off along the normal n by E[w e] / w = sigma^2 (dw / dr) / w, m. `variance`: of
+// one point along n. Along the plane a point moves by the sine of its angle of incidence times e, and the range by the same share of that.
+double pull_of_noise(const Eigen::Vector3d& n, const Eigen::Vector3d& beam, double variance, const LidarConfig& config) {
+  const double range = beam.norm(), cosine = n.dot(beam) / range, sine2 = 1 - cosine * cosine;
+  const double range2 = config.range_noise * config.range_noise, angle2 = config.angle_noise * config.angle_noise;
+  // On a plane at the distance h the cosine is h / r.
+  const double slope = 2 * (angle2 * range - range2 * cosine * cosine / range);
+  return -cosine * sine2 * range2 * slope / variance;
+}
+
+}  // namespace
+
+PoseCovariance LidarModel::systematic() const {
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  constexpr std::uint32_t none = 0xffffffff;
+  struct OfPlane {
+    Vector6 pull = Vector6::Zero();  // of its own error on b
+    OuterSum bumps;
+    int rows = 0;
+  };
+  std::vector<std::uint32_t> index_of_node(map_.node_capacity(), none);
+  std::vector<OfPlane> planes;
+  planes.reserve(associations_.size() / 2);
+  Vector6 pull = Vector6::Zero();
+  for (std::size_t i = 0; i < associations_.size(); ++i) {
+    const Association& a = associations_[i];
+    if (a.plane == nullptr) continue;
+    std::uint32_t& index = index_of_node[a.node];
+    if (index == none) {
+      index = static_cast<std::uint32_t>(planes.size());
+      planes.emplace_back();
+    }
+    OfPlane& plane = planes[index];
+    ++plane.rows;
+    plane.pull += a.weight * std::sqrt(a.plane_variance) * a.row.J;
+    const OuterRow bump(a.row.J, a.weight * a.weight * static_cast<double>(a.plane->roughness_variance));
+    plane.bumps.add(&bump, 1);
+    // A point that is alone in its cell weighs as it does itself.
+    const double count = clusters_[i].count, together = 1 - 1 / count;
+    pull += a.weight * together * pull_of_noise(a.n_I, clusters_[i].mean.cast<double>() - p_IL_, a.variance * count, config_) * a.row.J;
+  }
+  PoseCovariance M = pull * pull.transpose();
+  for (const OfPlane& plane : planes)
+    M += plane.pull * plane.pull.transpose() + std::max(1.0, plane.rows / bumps_of_a_plane) * plane.bumps.lower();
+  const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
+  return known.transpose() * M.selfadjointView<Eigen::Lower>() * known;
+}
+
+std::vector<EpochInformation> LidarModel::by_epoch() const {
+  std::vector<std::pair<std::uint32_t, OuterSum>> sums;
+  for (const Association& a : associations_) {
+    if (a.plane == nullptr) continue;
+    auto it = std::ranges::find_if(sums, [&a](const auto& sum) { return sum.first == a.epoch; });
+    if (it == sums.end()) it = sums.insert(it, {a.epoch, OuterSum()});
+    const OuterRow row(a.row.J, a.weight);
+    it->second.add(&row, 1);
+  }
+  std::vector<EpochInformation> out;
+  const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
+  for (const auto& [epoch, sum] : sums) {
+    const PoseCovariance A = sum.lower().selfadjointView<Eigen::Lower>();
+    out.push_back({epoch, known.transpose() * A * known});
+  }
+  return out;
+}
+
+}  // namespace kilvo
