@@ -1,8 +1,8 @@
 // The estimator: measurements in, states out. Values only: it never throws after construction, never prints, never asks the time.
 //
-// A measurement goes through the InputQueue. IMU and leg samples go into the History at once (the asynchronous phase). Scans and images wait
-// for the IMU, are registered by their pipelines at their own times, and the result becomes the base of the History (the sequential phase).
-// SensorStatus decides which sensors carry the estimate.
+// A measurement goes through the InputQueue. IMU and leg samples go into the History at once (the asynchronous phase). Scans and images
+// wait for the IMU, are registered by their pipelines at their own times, and the result becomes the base of the History (the sequential
+// phase). SensorStatus decides which sensors carry the estimate.
 #pragma once
 
 #include <array>
@@ -89,7 +89,8 @@ class Estimator {
   void choose_modality(Time t);
   bool keep_plausible(bool definite = false);  // `definite`: looks at the whole covariance
   Findings::Situation situation() const;
-  void emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0, double contact_us = 0);
+  void emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0,
+            double contact_us = 0);
 
   Robot robot_;
   EstimatorConfig config_;

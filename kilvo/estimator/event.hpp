@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "kilvo/sensors/reason.hpp"
 #include "kilvo/sensors/measurement.hpp"
+#include "kilvo/sensors/reason.hpp"
 
 namespace kilvo {
 

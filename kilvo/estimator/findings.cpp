@@ -107,8 +107,7 @@ void Findings::report_streams(const Situation& now) {
     if (stream.frozen > 0) events_.state({now.t, sensor, Reason::froze, 0, stream.frozen, {}});
   }
   constexpr double far_more = 10;
-  if (now.accel_noise > far_more * now.configured_noise)
-    events_.state({now.t, Sensor::imu, Reason::noisy_accel, now.accel_noise, 1, {}});
+  if (now.accel_noise > far_more * now.configured_noise) events_.state({now.t, Sensor::imu, Reason::noisy_accel, now.accel_noise, 1, {}});
   if (events_.all() != statistics_.events) statistics_.events = events_.all();
 }
 
@@ -174,8 +173,7 @@ void Findings::look_at_agreement(Time t, const Situation& now) {
   lost_stances_before_ = statistics_.lost_stances;
   if (lost >= most_lost_stances && !statistics_.diverged)
     contradict(Reason::diverged, Sensor::legs, has_lidar(now.modality) ? Sensor::lidar : Sensor::imu, static_cast<double>(lost),
-               "for seconds no foot seemed to stand still, and the velocity was given up " + std::to_string(lost) + " times in 10 s",
-               now);
+               "for seconds no foot seemed to stand still, and the velocity was given up " + std::to_string(lost) + " times in 10 s", now);
 }
 
 void Findings::judge_speed(const Situation& now) {
@@ -193,8 +191,8 @@ void Findings::judge_biases(const Situation& now) {
   strange_biases_ = true;
   const std::string why = "the biases that would reconcile them have changed since the start by " + decimals(accel, 2) + " m/s^2 and " +
                           decimals(gyro, 3) + " rad/s: is the mount right?";
-  contradict(impossible ? Reason::diverged : Reason::inconsistent, Sensor::imu, has_lidar(now.modality) ? Sensor::lidar : Sensor::legs, accel,
-             why, now);
+  contradict(impossible ? Reason::diverged : Reason::inconsistent, Sensor::imu, has_lidar(now.modality) ? Sensor::lidar : Sensor::legs,
+             accel, why, now);
 }
 
 }  // namespace kilvo

@@ -39,8 +39,7 @@ std::optional<FrameQueue::Frame> FrameQueue::pop(Time until) {
   auto next = frames_.begin();
   if (!is_scan(*next)) {
     const Time image = next->end;
-    const auto before =
-        std::ranges::find_if(frames_, [&](const Frame& f) { return f.end <= until && f.middle() <= image && is_scan(f); });
+    const auto before = std::ranges::find_if(frames_, [&](const Frame& f) { return f.end <= until && f.middle() <= image && is_scan(f); });
     if (before == frames_.end() && waits_for_scan(image, until)) return std::nullopt;
     if (before != frames_.end()) next = before;
   }

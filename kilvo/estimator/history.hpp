@@ -1,6 +1,6 @@
-// The estimate over time. The base is what the last sweep or image left, at its own time; every later estimate is the base carried on by the
-// IMU samples and leg updates since then. When a sweep corrects its own time, the base is replaced and all that came since is propagated
-// again (Replay): the asynchronous and the sequential phase of the paper meet here and nowhere else.
+// The estimate over time. The base is what the last sweep or image left, at its own time; every later estimate is the base carried on by
+// the IMU samples and leg updates since then. When a sweep corrects its own time, the base is replaced and all that came since is
+// propagated again (Replay): the asynchronous and the sequential phase of the paper meet here and nowhere else.
 #pragma once
 
 #include <array>

@@ -38,8 +38,8 @@ class LivePropagator {
   Time known() const { return history_.closed().t; }
 
   /// Goes on from the estimator's present state; `map_error`: of the map around there. Allocates only when it has never held so much.
-  void become(const History& history, const LegPipeline& legs, const ImuWatch& imu, const SensorStatus& status, const PoseCovariance& map_error,
-              std::uint32_t epoch);
+  void become(const History& history, const LegPipeline& legs, const ImuWatch& imu, const SensorStatus& status,
+              const PoseCovariance& map_error, std::uint32_t epoch);
 
  private:
   void close(Time until);

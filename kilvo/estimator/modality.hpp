@@ -18,9 +18,9 @@ struct ModalityRow {
 
 /// By Modality.
 inline constexpr std::array modalities = {
-    ModalityRow{Modality::kilv, "KILV", true, true, true, false},   ModalityRow{Modality::kil, "KIL", true, true, false, false},
-    ModalityRow{Modality::ki, "KI", true, false, false, true},      ModalityRow{Modality::liv, "LIV", false, true, true, false},
-    ModalityRow{Modality::li, "LI", false, true, false, false},     ModalityRow{Modality::coast, "COAST", false, false, false, false},
+    ModalityRow{Modality::kilv, "KILV", true, true, true, false}, ModalityRow{Modality::kil, "KIL", true, true, false, false},
+    ModalityRow{Modality::ki, "KI", true, false, false, true},    ModalityRow{Modality::liv, "LIV", false, true, true, false},
+    ModalityRow{Modality::li, "LI", false, true, false, false},   ModalityRow{Modality::coast, "COAST", false, false, false, false},
 };
 
 constexpr const ModalityRow& row_of(Modality m) { return modalities[static_cast<std::size_t>(m)]; }

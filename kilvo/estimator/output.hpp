@@ -10,9 +10,9 @@
 
 #include "kilvo/estimator/degradation.hpp"
 #include "kilvo/estimator/event.hpp"
-#include "kilvo/input/health.hpp"
 #include "kilvo/estimator/modality.hpp"
 #include "kilvo/filter/state.hpp"
+#include "kilvo/input/health.hpp"
 #include "kilvo/legs/contact_estimator.hpp"
 #include "kilvo/lidar/point_to_plane.hpp"
 #include "kilvo/sensors/measurement.hpp"

@@ -53,9 +53,7 @@ bool SensorStatus::are_legs_lost(Time imu_heard, const Health& health) const {
   return last_legs_ && (health.is_frozen(Sensor::legs) || imu_heard - *last_legs_ > silence_of_legs(rate_of(Sensor::legs)));
 }
 
-bool SensorStatus::are_legs_overdue(Time t) const {
-  return kilvo::are_legs_overdue(t - *last_legs_, rate_of(Sensor::legs), leg_period_);
-}
+bool SensorStatus::are_legs_overdue(Time t) const { return kilvo::are_legs_overdue(t - *last_legs_, rate_of(Sensor::legs), leg_period_); }
 
 void SensorStatus::lose_imu(const Health& health) {
   imu_lost_ = true;

@@ -15,7 +15,8 @@ namespace kilvo {
 class SensorStatus {
  public:
   /// `with_lidar`: the LiDAR is to be used.
-  SensorStatus(const Robot& robot, bool with_lidar) : rates_{robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate}, with_lidar_(with_lidar) {}
+  SensorStatus(const Robot& robot, bool with_lidar)
+      : rates_{robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate}, with_lidar_(with_lidar) {}
 
   /// The first estimate is of `t`. `legs`: they are taken as there until they stay silent.
   void begin(Time t, bool legs);
@@ -38,8 +39,8 @@ class SensorStatus {
   bool are_legs_lost(Time imu_heard, const Health& health) const;
   /// While the legs are used their samples carry the outputs, unless one comes so late that the IMU's must.
   bool are_legs_overdue(Time t) const;
-  /// Legs that come again in the middle of an impact would start with wrong contacts (paper, Section IV-E), and which foot stands is told by
-  /// what is still, for which the velocity must be known: whether those of `t` may be used, or have waited for long enough.
+  /// Legs that come again in the middle of an impact would start with wrong contacts (paper, Section IV-E), and which foot stands is told
+  /// by what is still, for which the velocity must be known: whether those of `t` may be used, or have waited for long enough.
   bool may_legs_return(Time t, bool is_calm, bool is_velocity_known, const Health& health);
   double leg_period() const { return leg_period_; }
 

@@ -9,7 +9,8 @@ namespace kilvo {
 
 class WorldMap {
  public:
-  WorldMap(const MapConfig& config, const LidarConfig& lidar, const Eigen::Vector3d& p_IL) : config_(config), lidar_(lidar), p_IL_(p_IL), surfaces_(config) {}
+  WorldMap(const MapConfig& config, const LidarConfig& lidar, const Eigen::Vector3d& p_IL)
+      : config_(config), lidar_(lidar), p_IL_(p_IL), surfaces_(config) {}
 
   /// The surroundings are known: they stay as they are.
   void give(VoxelMap map);

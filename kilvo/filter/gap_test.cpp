@@ -44,21 +44,5 @@ TEST(GapInflation, TurnsMoreAboutTheVerticalThanItLeans) {
   EXPECT_GT(e.P(at::R + 2, at::R + 2), 10 * e.P(at::R, at::R));
 }
 
-TEST(StationarityDetector, TakesAnImpactForUnusualAndForgetsIt) {
-  StationarityDetector detector(InitialConfig{}, 10);
-  ImuSample s;
-  const auto add = [&](int i, double z) {
-    s.t = at_seconds(0.005 * i);
-    s.accel = {0.1 * std::sin(0.9 * i), 0.1 * std::cos(1.3 * i), z + 0.2 * std::sin(0.5 * i)};
-    detector.add(s);
-  };
-  for (int i = 0; i < 600; ++i) add(i, 9.8);
-  EXPECT_TRUE(detector.is_usual(s.t, std::chrono::milliseconds(20)));
-  add(600, 40);
-  EXPECT_FALSE(detector.is_usual(s.t, std::chrono::milliseconds(20)));
-  for (int i = 601; i < 610; ++i) add(i, 9.8);
-  EXPECT_TRUE(detector.is_usual(s.t, std::chrono::milliseconds(20)));
-}
-
 }  // namespace
 }  // namespace kilvo

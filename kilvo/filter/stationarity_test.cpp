@@ -1,10 +1,14 @@
 #include "kilvo/filter/stationarity.hpp"
 
+#include <cmath>
 #include <gtest/gtest.h>
 #include <random>
+#include <vector>
 
 namespace kilvo {
 namespace {
+
+Time at_seconds(double s) { return Time(from_seconds(s)); }
 
 // At 200 Hz, of a robot that stands or sways.
 std::vector<ImuSample> stream(bool moving, int count) {
@@ -31,6 +35,22 @@ TEST(StationarityDetector, StandsAfterHalfASecondOfRestAndNotInMotion) {
     for (int i = 90; i < 150; ++i) detector.add(samples[static_cast<std::size_t>(i)]);
     EXPECT_EQ(detector.stands(), !moving);
   }
+}
+
+TEST(StationarityDetector, TakesAnImpactForUnusualAndForgetsIt) {
+  StationarityDetector detector(0.03, 0.4, 10);
+  ImuSample s;
+  const auto add = [&](int i, double z) {
+    s.t = at_seconds(0.005 * i);
+    s.accel = {0.1 * std::sin(0.9 * i), 0.1 * std::cos(1.3 * i), z + 0.2 * std::sin(0.5 * i)};
+    detector.add(s);
+  };
+  for (int i = 0; i < 600; ++i) add(i, 9.8);
+  EXPECT_TRUE(detector.is_usual(s.t, std::chrono::milliseconds(20)));
+  add(600, 40);
+  EXPECT_FALSE(detector.is_usual(s.t, std::chrono::milliseconds(20)));
+  for (int i = 601; i < 610; ++i) add(i, 9.8);
+  EXPECT_TRUE(detector.is_usual(s.t, std::chrono::milliseconds(20)));
 }
 
 }  // namespace

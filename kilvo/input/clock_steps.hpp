@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "kilvo/sensors/reason.hpp"
 #include "kilvo/sensors/measurement.hpp"
+#include "kilvo/sensors/reason.hpp"
 
 namespace kilvo {
 

@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "kilvo/sensors/reason.hpp"
 #include "kilvo/sensors/measurement.hpp"
+#include "kilvo/sensors/reason.hpp"
 
 namespace kilvo {
 

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "kilvo/sensors/reason.hpp"
 #include "kilvo/sensors/measurement.hpp"
+#include "kilvo/sensors/reason.hpp"
 #include "kilvo/sensors/robot.hpp"
 
 namespace kilvo {

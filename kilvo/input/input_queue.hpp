@@ -39,8 +39,8 @@ class InputQueue {
   bool time_went_back() const { return first_of_next_.has_value(); }
   InputQueue next_epoch();
 
-  /// The clock of a camera or a LiDAR was found to be off the IMU's: from now on its stamps are later by so much more. Returns by how much they
-  /// are later in all, s, which is bounded.
+  /// The clock of a camera or a LiDAR was found to be off the IMU's: from now on its stamps are later by so much more. Returns by how much
+  /// they are later in all, s, which is bounded.
   double shift_by(Sensor s, double by);
   /// The stamps of this sensor have been found to be off before.
   bool is_shifted(Sensor s) const { return shift_[static_cast<std::size_t>(s)] != Duration(0); }

@@ -1,5 +1,5 @@
-// One leg sample, from the feet to the rows of the update: which foot is in contact, which one stands and on which point, how much it counts.
-// Owns what has to be remembered of the legs; changes no estimate.
+// One leg sample, from the feet to the rows of the update: which foot is in contact, which one stands and on which point, how much it
+// counts. Owns what has to be remembered of the legs; changes no estimate.
 #pragma once
 
 #include <array>
@@ -16,8 +16,8 @@ class LegPipeline {
   /// Throws std::invalid_argument when config.contact names no detector.
   explicit LegPipeline(const LegConfig& config) : contacts_(config), stances_(config) {}
 
-  /// What the feet say of `predicted`, the estimate of their time, and what that took. `imu`: of the feet's time. `map`: on whose planes the feet stand,
-  /// if any. Allocates nothing.
+  /// What the feet say of `predicted`, the estimate of their time, and what that took. `imu`: of the feet's time. `map`: on whose planes
+  /// the feet stand, if any. Allocates nothing.
   struct LegUpdate {
     LegStep step;
     double contact_us = 0;  // the contacts' part of the time

@@ -1,5 +1,5 @@
-// One sweep, from the message to the estimate at its middle: undistortion, clusters, registration to the map, and whether it may be believed.
-// Owns what has to be remembered of the sweeps; changes neither map nor estimate.
+// One sweep, from the message to the estimate at its middle: undistortion, clusters, registration to the map, and whether it may be
+// believed. Owns what has to be remembered of the sweeps; changes neither map nor estimate.
 #pragma once
 
 #include <optional>
@@ -69,7 +69,8 @@ class LidarPipeline {
     std::optional<double> offset;  // s, to be added to the stamps from now on
   };
   /// Before accept(): a sweep from `begin` to `end` turned the state from `prior` to `posterior`. An offset of less than `least` s is none.
-  ClockEvidence check_clock(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory, Time begin, Time end, double least);
+  ClockEvidence check_clock(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory, Time begin, Time end,
+                            double least);
 
   /// Takes a pose error to its part along what the last sweep did not know.
   const PoseCovariance& unobservable() const { return unobservable_; }

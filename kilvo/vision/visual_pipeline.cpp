@@ -60,7 +60,7 @@ struct VisualPipeline::Work {
   DepthView depth;
   std::vector<PatchCandidate> tracks;
   PhotometricModel model;
-  Estimate prior;         // with the exposure that the image has
+  Estimate prior;  // with the exposure that the image has
   Estimate posterior;
   Eigen::Vector3d omega;  // of the body, rad/s
 };
@@ -250,7 +250,8 @@ std::vector<ColouredPoint> VisualPipeline::learn(const VoxelMap& map, const Pose
   judge_points(work, map, frame.T_CW, id);
   for (const NewPoint& found : new_points(map, camera_, frame.T_CW, work.pyramid[0], work.depth, work.tracks, config_)) {
     const Eigen::Vector2f pixel = found.pixel.cast<float>();
-    if (const auto patch = cut_patch(work.pyramid, pixel.cast<double>())) map_.insert(found.point, {.frame = id, .pixel = pixel, .patch = *patch});
+    if (const auto patch = cut_patch(work.pyramid, pixel.cast<double>()))
+      map_.insert(found.point, {.frame = id, .pixel = pixel, .patch = *patch});
   }
   map_.forget_unused_frame(id);
   map_.forget(posterior.x.p, map_radius_);

@@ -1,5 +1,6 @@
-// One image, from the message to the estimate at its time: which patches of the visual map it should show, how the pose and the exposure must
-// be for that, whether that may be believed, and what is learnt from it. Owns the visual map; changes neither the LiDAR's map nor the estimate.
+// One image, from the message to the estimate at its time: which patches of the visual map it should show, how the pose and the exposure
+// must be for that, whether that may be believed, and what is learnt from it. Owns the visual map; changes neither the LiDAR's map nor the
+// estimate.
 #pragma once
 
 #include <memory>
@@ -24,7 +25,7 @@ namespace kilvo {
 
 /// What the estimator knows when an image comes.
 struct ImageContext {
-  Estimate prior;       // at the image's time, or that of a later sweep that was there first
+  Estimate prior;        // at the image's time, or that of a later sweep that was there first
   SE3 T_image, T_prior;  // poses of the IMU at the image's and at the prior's time, in one frame, any; the same when the times are
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();        // at the image's time, as measured, rad/s
   PoseCovariance unobservable = PoseCovariance::Zero();  // takes a pose error to its part along what the last sweep did not know
@@ -45,7 +46,8 @@ struct VisualRegistration {
 
 class VisualPipeline {
  public:
-  VisualPipeline(const CameraMount& mount, const VisionConfig& config, const VisualMapConfig& map, const UpdateConfig& update, double map_radius);
+  VisualPipeline(const CameraMount& mount, const VisionConfig& config, const VisualMapConfig& map, const UpdateConfig& update,
+                 double map_radius);
   VisualPipeline(VisualPipeline&&) noexcept;
   VisualPipeline& operator=(VisualPipeline&&) noexcept;
   ~VisualPipeline();
@@ -101,8 +103,8 @@ class VisualPipeline {
   VisualMap map_;
   MountCheck mount_check_;
   Time begins_at_{}, doubted_until_{};
-  Duration pause_{};  // after the mount was doubted the last time
-  int in_vain_ = 0;   // images in a row in which hardly any patch was found
+  Duration pause_{};                                  // after the mount was doubted the last time
+  int in_vain_ = 0;                                   // images in a row in which hardly any patch was found
   Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();  // of the last image, m
   std::vector<Eigen::Vector4f> seen_W_;
   bool size_is_reported_ = false;

@@ -1,0 +1,148 @@
+// The sequential phase: sweeps and images update the state at their own times; what came since is propagated again.
+#include <algorithm>
+
+#include "kilvo/estimator/estimator.hpp"
+#include "kilvo/math/stopwatch.hpp"
+
+namespace kilvo {
+namespace {
+
+std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE3& T_WI) {
+  std::vector<PointXYZI> out(points_I.size());
+  const Eigen::Matrix3f R = T_WI.R.matrix().cast<float>();
+  const Eigen::Vector3f p = T_WI.p.cast<float>();
+  for (std::size_t i = 0; i < points_I.size(); ++i) {
+    out[i].head<3>() = R * points_I[i].head<3>() + p;
+    out[i][3] = points_I[i][3];
+  }
+  return out;
+}
+
+// Offsets of a clock below these are of no consequence, or a model's error; once there is one, it is found as exactly as the data allows,
+// s.
+double least_offset(bool is_shifted) { return is_shifted ? 5e-4 : 2e-3; }
+
+}  // namespace
+
+void Estimator::process_frames(Time until, std::vector<Output>& out) {
+  while (auto frame = frames_.pop(until)) {
+    if (const auto* scan = std::get_if<LidarScan>(&frame->what)) {
+      process(*scan, out);
+    } else {
+      process(std::get<CameraImage>(frame->what));
+    }
+  }
+}
+
+void Estimator::process(const LidarScan& scan, std::vector<Output>& out) {
+  const Time begin = begin_of(scan), end = end_of(scan);
+  if (end < history_.base().t) return findings_.drop(Sensor::lidar, Reason::before_state);
+  if (history_.replay().is_blind(begin, end)) return findings_.drop(Sensor::lidar, Reason::no_imu);
+  if (frames_.last_middle()) lidar_.note_silence(begin - status_.last_sweep());
+  Stopwatch watch;
+  // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
+  // the sweep cancels to first order. What came since is propagated again.
+  const Time middle = std::max(history_.base().t, end - (end - begin) / 2);
+  const Estimate prior = history_.at(middle);
+  history_.record_from(prior, end);
+  if (!lidar_.has_shape(end, prior)) return findings_.drop(Sensor::lidar, Reason::before_motion);
+  Statistics& statistics = findings_.statistics();
+  const PoseCovariance map_error = map_.error_at(prior.x.pose());
+  const bool first = map_.surfaces().empty();
+  const Registration sweep = lidar_.measure(scan, end, prior, history_.trajectory(), map_.surfaces(), map_error, statistics.points);
+  statistics.searches += sweep.searched ? 1 : 0;
+  statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
+  if (sweep.refused) return refuse_sweep(*sweep.refused, prior, end);
+  history_.resume(sweep.posterior);
+  const bool good = keep_plausible(true);
+  Output result;
+  result.stages.lidar_us = watch.lap_us();
+
+  const SE3 T_WI = history_.now().x.pose();
+  if (good) {
+    const auto clock =
+        lidar_.check_clock(prior, sweep.posterior, history_.trajectory(), begin, end, least_offset(input_.is_shifted(Sensor::lidar)));
+    if (clock.doubtful && vision_) vision_->restart_mount_check();  // it may see nothing but this
+    if (clock.offset)
+      findings_.report_clock_offset(situation(), Sensor::lidar, input_.shift_by(Sensor::lidar, *clock.offset), robot_.lidar.time_offset);
+    history_.correct_trajectory(sweep.posterior, sweep.posterior.x.v - prior.x.v);
+    lidar_.accept(sweep);
+    if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior);
+    map_.learn(sweep, lidar_.unobservable(), lidar_.may_learn(prior, sweep, map_error));
+    history_.rebase(sweep.posterior);
+  }
+  result.stages.map_us = watch.lap_us();
+
+  history_.advance_to(end);
+  findings_.use(Sensor::lidar);
+  if (sweep.carries) status_.sweep_used(end);
+  choose_modality(end);
+  frames_.scan_used(middle);
+  result.registration = sweep.report;
+  result.indicators = indicators_of(sweep.points, sweep.report);
+  result.points_W = in_world(sweep.points, T_WI);
+  if (vision_) vision_->see(result.points_W);
+  result.stages.other_us = watch.lap_us();
+  outputs_.add_sweep(std::move(result));
+  // While the legs are used it goes out with the next of their samples, which is not earlier than those that have gone.
+  if (!status_.has_legs()) emit(history_.now(), out);
+}
+
+// A sweep that fits nowhere is not used; when that has lasted, the robot is taken to be outside of the map: it begins anew around it.
+void Estimator::refuse_sweep(Reason reason, const Estimate& prior, Time end) {
+  findings_.drop(Sensor::lidar, reason);
+  if (reason != Reason::fits_nowhere) return;
+  history_.resume(prior);
+  if (lidar_.refuse(end, map_.is_given())) {
+    map_.begin_anew(prior);
+    if (vision_) vision_->forget_map();
+    ++findings_.statistics().maps_begun_anew;
+    findings_.report(situation(), Sensor::lidar, Reason::map_begun_anew);
+    findings_.contradict(Reason::diverged, Sensor::lidar, Findings::witness_against(Sensor::lidar, situation()), 2,
+                         "for 2 s no sweep fitted the map where it should have been", situation());
+  }
+  history_.advance_to(end);
+}
+
+void Estimator::process(const CameraImage& image) {
+  const auto refuse = [this](Reason r) { findings_.drop(Sensor::camera, r); };
+  if (const auto reason = vision_->refuses(image.t)) return refuse(*reason);
+  const auto motion = history_.motion_since(image.t);
+  if (!motion) return refuse(Reason::before_state);
+  if (history_.replay().is_blind(image.t, image.t)) return refuse(Reason::no_imu);
+  // Vision lives by the surfaces of the LiDAR: without it, nobody can tell what hides what, and images can only drift.
+  constexpr double scans = 3.5;
+  if (image.t - frames_.last_middle().value_or(Time{}) > from_seconds(scans / robot_.lidar.rate)) return refuse(Reason::no_lidar);
+  if (lidar_.is_rejoining()) return refuse(Reason::before_rejoined);
+  Stopwatch watch;
+  ImageContext context;
+  context.prior = history_.at(std::max(image.t, history_.base().t));
+  context.T_image = motion->begin;
+  context.T_prior = motion->end;
+  context.gyro = history_.replay().gyro_at(image.t).value_or(context.prior.x.bg);
+  context.unobservable = lidar_.unobservable();
+  context.feet_hold = lidar_.is_blind_somewhere() && status_.has_legs() && legs_.has_stood_lately(image.t);
+  const VisualRegistration seen = vision_->measure(image, context);
+  if (seen.refused == Reason::pose_uncertain) return refuse(*seen.refused);
+  if (seen.refused == Reason::not_finite) {
+    history_.resume(seen.posterior);
+    keep_plausible(true);
+    return refuse(Reason::not_finite);
+  }
+  history_.rebase(seen.posterior);
+  if (seen.refused == Reason::mount_doubted) findings_.report_turned_camera(situation(), seen.turned);
+  if (seen.refused) return refuse(*seen.refused);
+  findings_.use(Sensor::camera);
+  history_.correct_trajectory(seen.posterior, seen.posterior.x.v - context.prior.x.v);
+  map_.held_against(seen.posterior.x.pose(), seen.drift, context.unobservable);
+  Output result;
+  result.coloured = vision_->learn(map_.surfaces(), map_.error().total(seen.T_WI, seen.posterior.P.topLeftCorner<6, 6>()));
+  if (const auto offset = vision_->clock_offset(least_offset(input_.is_shifted(Sensor::camera))))
+    findings_.report_clock_offset(situation(), Sensor::camera, input_.shift_by(Sensor::camera, *offset), robot_.camera.time_offset);
+  if (seen.carries) status_.image_used(image.t);
+  result.indicators = indicators_of(seen.used);
+  result.stages.visual_us = watch.lap_us();
+  outputs_.add_image(std::move(result));
+}
+
+}  // namespace kilvo
