@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 
 namespace kilvo::lab {
 namespace {
@@ -13,29 +14,35 @@ constexpr double most = 20000;  // points of a voxel
 
 constexpr std::size_t first_slots = 1024;
 
-// floor() without a call.
-Eigen::Vector3d floor_of(const Eigen::Vector3d& x) {
-  Eigen::Vector3d out;
+// The voxel that a point lies in.
+struct Cell {
+  Eigen::Vector3d at;  // coordinates in voxels
+  std::uint64_t key = 0;
+};
+
+inline Cell cell_of(const Eigen::Vector3d& p, double side) {
+  Cell cell;
   for (int i = 0; i < 3; ++i) {
-    const auto down = static_cast<double>(static_cast<std::int64_t>(x[i]));
-    out[i] = down > x[i] ? down - 1 : down;
+    // floor() without a call
+    const double x = p[i] / side;
+    auto down = static_cast<std::int64_t>(x);
+    down -= static_cast<double>(down) > x ? 1 : 0;
+    cell.at[i] = static_cast<double>(down);
+    cell.key = cell.key << 21 | (static_cast<std::uint64_t>(down + (1 << 20)) & ((1 << 21) - 1));
   }
-  return out;
+  return cell;
 }
+
+inline std::uint64_t home_of(std::uint64_t key) { return key * 0x9E3779B97F4A7C15ULL >> 32; }
 
 }  // namespace
 
 PlaneGrid::PlaneGrid(double side) : side_(side), slots_(first_slots) {}
 
-std::uint64_t PlaneGrid::key_of(const Eigen::Vector3d& cell) {
-  const auto part = [](double x) { return static_cast<std::uint64_t>(static_cast<std::int64_t>(x) + (1 << 20)) & ((1 << 21) - 1); };
-  return (part(cell.x()) << 42) | (part(cell.y()) << 21) | part(cell.z());
-}
-
 // Where the voxel of this key is, or would be.
 std::size_t PlaneGrid::slot_of(std::uint64_t key) const {
   const std::size_t mask = slots_.size() - 1;
-  std::size_t i = (key * 0x9E3779B97F4A7C15ULL >> 32) & mask;
+  std::size_t i = home_of(key) & mask;
   while (slots_[i].voxel != none && slots_[i].key != key) i = (i + 1) & mask;
   return i;
 }
@@ -48,23 +55,41 @@ void PlaneGrid::grow() {
   }
 }
 
-void PlaneGrid::insert(const Eigen::Vector3d& p) {
-  const Eigen::Vector3d cell = floor_of(p / side_);
-  const std::uint64_t key = key_of(cell);
+PlaneGrid::Voxel& PlaneGrid::voxel_of(std::uint64_t key) {
   Slot& slot = slots_[slot_of(key)];
-  const bool is_new = slot.voxel == none;
-  if (is_new) {
-    slot = {key, static_cast<std::uint32_t>(voxels_.size())};
-    voxels_.emplace_back();
+  if (slot.voxel != none) return voxels_[slot.voxel];
+  slot = {key, static_cast<std::uint32_t>(voxels_.size())};
+  Voxel& voxel = voxels_.emplace_back();
+  if (2 * voxels_.size() > slots_.size()) grow();
+  return voxel;
+}
+
+void PlaneGrid::insert(std::span<const Eigen::Vector3d> points) {
+  // So many wait for memory at once.
+  constexpr std::size_t together = 16;
+  std::array<Cell, together> cells;
+  for (std::size_t first = 0; first < points.size(); first += together) {
+    const auto some = points.subspan(first, std::min(together, points.size() - first));
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      cells[i] = cell_of(some[i], side_);
+      __builtin_prefetch(&slots_[home_of(cells[i].key) & (slots_.size() - 1)]);
+    }
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      const Slot& slot = slots_[slot_of(cells[i].key)];
+      if (slot.voxel == none) continue;
+      const char* const voxel = reinterpret_cast<const char*>(&voxels_[slot.voxel]);
+      for (std::size_t line = 0; line < sizeof(Voxel); line += 64) __builtin_prefetch(voxel + line);
+    }
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      Voxel& v = voxel_of(cells[i].key);
+      if (v.n >= most) continue;
+      // About the voxel's corner, so that squares stay small.
+      const Eigen::Vector3d d = some[i] - side_ * cells[i].at;
+      v.n += 1;
+      v.sum += d;
+      v.squares += d * d.transpose();
+    }
   }
-  Voxel& v = voxels_[slot.voxel];
-  if (is_new && 2 * voxels_.size() > slots_.size()) grow();
-  if (v.n >= most) return;
-  // About the voxel's corner, so that squares stay small.
-  const Eigen::Vector3d d = p - side_ * cell;
-  v.n += 1;
-  v.sum += d;
-  v.squares += d * d.transpose();
 }
 
 void PlaneGrid::fit(Voxel& v, const Eigen::Vector3d& corner) const {
@@ -78,12 +103,12 @@ void PlaneGrid::fit(Voxel& v, const Eigen::Vector3d& corner) const {
 }
 
 const GridPlane* PlaneGrid::find(const Eigen::Vector3d& p) {
-  const Eigen::Vector3d cell = floor_of(p / side_);
-  const Slot& slot = slots_[slot_of(key_of(cell))];
+  const Cell cell = cell_of(p, side_);
+  const Slot& slot = slots_[slot_of(cell.key)];
   if (slot.voxel == none) return nullptr;
   Voxel& v = voxels_[slot.voxel];
   if (v.n < fewest) return nullptr;
-  if (v.n >= refit * v.fitted_n) fit(v, side_ * cell);
+  if (v.n >= refit * v.fitted_n) fit(v, side_ * cell.at);
   return v.planar ? &v.plane : nullptr;
 }
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace kilvo::lab {
@@ -15,7 +16,7 @@ struct GridPlane {
 class PlaneGrid {
  public:
   explicit PlaneGrid(double side);
-  void insert(const Eigen::Vector3d& p);
+  void insert(std::span<const Eigen::Vector3d> points);
   /// The plane in the voxel of this point, nullptr without one. Good until the next insert().
   const GridPlane* find(const Eigen::Vector3d& p);
 
@@ -33,8 +34,8 @@ class PlaneGrid {
     std::uint64_t key = 0;
     std::uint32_t voxel = none;
   };
-  static std::uint64_t key_of(const Eigen::Vector3d& cell);
   std::size_t slot_of(std::uint64_t key) const;
+  Voxel& voxel_of(std::uint64_t key);
   void grow();
   void fit(Voxel& voxel, const Eigen::Vector3d& corner) const;
 

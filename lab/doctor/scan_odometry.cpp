@@ -201,11 +201,14 @@ class Odometry {
       }
     }
     if (pose.good || first_) {
+      near_.clear();
+      all_.clear();
       for (const Point& p : points_) {
-        const Eigen::Vector3d at = pose.T_WL * p.p + p.dt * pose.v_W;
-        if (p.p.norm() < far) fine_.insert(at);
-        coarse_.insert(at);
+        all_.push_back(pose.T_WL * p.p + p.dt * pose.v_W);
+        if (p.p.norm() < far) near_.push_back(all_.back());
       }
+      fine_.insert(near_);
+      coarse_.insert(all_);
     } else {
       omega_.setZero();
     }
@@ -220,7 +223,8 @@ class Odometry {
   Deskew deskew_;
   PlaneGrid fine_{fine}, coarse_{coarse};
   std::vector<Point> points_;
-  std::vector<Row> rows_;  // of one iteration
+  std::vector<Row> rows_;                    // of one iteration
+  std::vector<Eigen::Vector3d> near_, all_;  // points of a sweep in the first sweep's frame
   SweepPose last_;
   Eigen::Vector3d omega_ = Eigen::Vector3d::Zero();
   bool first_ = true;
