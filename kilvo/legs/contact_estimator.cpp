@@ -83,6 +83,8 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
   // A velocity that is not known better than what tells standing from swinging says little of either.
   cues.known_velocity = 1 / (1 + sigma_v * sigma_v / (threshold * threshold));
   filter_.update(cues);
+  const double left = filter_.share_of_left(cues.force_side);
+  contacts_.load = {left, 1 - left};
   deviate(accel, cues.dt);
   contacts_.t = feet.t;
   report(feet, x, motion, map);

@@ -20,6 +20,7 @@ struct Contacts {
   Time t{};
   std::array<bool, 2> on = {true, true};
   std::array<double, 2> probability = {1, 1};         // of standing
+  std::array<double, 2> load = {0.5, 0.5};            // share of the weight, while both stand
   bool flight = false;                                // the IMU measures free fall
   std::array<Time, 2> since{};                        // of the present phase of each
   std::array<double, 2> clearance = {0, 0};           // of the lowest point over the ground on which it stood last, m

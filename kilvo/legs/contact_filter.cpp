@@ -19,6 +19,8 @@ constexpr double slowest = 0.002;
 // An impact counts for so long, s; without any knowledge it comes by chance so often within a swing of a second.
 constexpr double impact_time = 0.05, chance = 0.02, most_of_impact = 6;
 constexpr double rate_of_change = 10;  // 1/s
+// Where the line of force meets the ground on either foot is this far apart at least, of the distance of the feet.
+constexpr double least_apart = 0.6;
 constexpr double weightless = 0.2, half_weight = 0.5;
 
 double square(double x) { return x * x; }
@@ -83,8 +85,14 @@ void ContactFilter::add_height(double height, Likelihood& log) const {
   log[both] += std::max(-most_of_others, b - most);
 }
 
+double ContactFilter::share_of_left(double force_side) const {
+  const double apart = std::max(least_apart, on_left_.mean() - on_right_.mean());
+  const double middle = 0.5 * (on_left_.mean() + on_right_.mean());
+  return std::clamp(0.5 + (force_side - middle) / apart, 0.0, 1.0);
+}
+
 void ContactFilter::add_force_side(double side, Likelihood& log) const {
-  constexpr double least_sigma = 0.15, least_apart = 0.6;
+  constexpr double least_sigma = 0.15;
   const double middle = 0.5 * (on_left_.mean() + on_right_.mean());
   const double apart = std::max(least_apart, on_left_.mean() - on_right_.mean());
   const double l = above(middle + 0.5 * apart - side, std::max(least_sigma, on_left_.sigma()));

@@ -41,6 +41,9 @@ class ContactFilter {
   /// A supporting foot is slower than this for five samples out of six.
   double fast_stance() const;
 
+  /// Of the weight, on the left foot while both stand: where the line of force lies between where it usually is on either.
+  double share_of_left(double force_side) const;
+
   /// Forgets which feet stand, not what has been learnt.
   void restart();
 

@@ -67,6 +67,26 @@ TEST(ContactFilter, LearnsRobotsWhoseSolesNeverSeemToStandStill) {
   }
 }
 
+TEST(ContactFilter, TheShareOfTheLoadIsCountedFromWhereTheForceGoesOnThisRobot) {
+  ContactFilter fresh;
+  EXPECT_NEAR(fresh.share_of_left(0.5), 0.5, 1e-12);
+  EXPECT_EQ(fresh.share_of_left(-1), 0);
+  EXPECT_EQ(fresh.share_of_left(2), 1);
+  // A robot that leans: on its left foot the line of force passes at 1.3, on its right one at 0.3.
+  Walk walk;
+  walk.side_noise = 0.05;
+  test::Random random(5);
+  ContactFilter filter;
+  for (double s = -1; s < 12; s += 0.005) {
+    ContactCues cues = walk.cues(random, s, 0.005);
+    cues.force_side += 0.3;
+    filter.update(cues);
+  }
+  EXPECT_NEAR(filter.share_of_left(0.8), 0.5, 0.05);
+  EXPECT_GT(filter.share_of_left(1.25), 0.9);
+  EXPECT_LT(filter.share_of_left(0.35), 0.1);
+}
+
 TEST(ContactFilter, OneWildSampleDecidesNothing) {
   for (const double dt : {0.0005, 0.001, 0.002}) {
     ContactFilter filter;

@@ -16,7 +16,7 @@ struct LegConfig {
   double position_sigma = 0.0005;          // m
   double position_correlation = 0.5;       // s
   double ground_sigma = 0.02;              // m
-  double entry_delay = 0.015;              // s
+  double entry_delay = 0.016;              // s
   double gate = 5.0;
 
   static constexpr auto fields() {
@@ -32,7 +32,8 @@ struct LegConfig {
         Field{"position_correlation", &LegConfig::position_correlation, "s", "correlation time of that"},
         Field{"ground_sigma", &LegConfig::ground_sigma, "m",
               "standard deviation of a foot's height over the map's ground at touchdown, without LiDAR"},
-        Field{"entry_delay", &LegConfig::entry_delay, "s", "a foot is used this long after its touchdown"},
+        Field{"entry_delay", &LegConfig::entry_delay, "s",
+              "a foot is used this long after the last sample that did not show its touchdown"},
         Field{"gate", &LegConfig::gate, "sigma", "a standing foot that moves more than this is not used"}};
   }
 };

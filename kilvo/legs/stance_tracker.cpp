@@ -23,6 +23,8 @@ constexpr double surely_turning = 0.1;
 constexpr double sink_share = 0.15;
 // A foot enters loosely and settles over this time, s.
 constexpr double entry_time = 0.02;
+// Of two feet that stand, the lighter one counts less: a sole that carries little slides and rolls. So much is left to it at least.
+constexpr double least_load = 0.01;
 constexpr double shortest_step = 1e-4, longest_step = 0.05;  // s
 
 // How much each corner of a sole carries, which adds up to one.
@@ -88,7 +90,7 @@ std::optional<GroundPatch> StanceTracker::ground_under(const VoxelMap& map, cons
 }
 
 // The feet whose rows are used. Of a robot that does not fly one carries at any time: when none is believed to, the more probable.
-std::array<bool, 2> StanceTracker::carriers(const Contacts& contacts) const {
+std::array<bool, 2> StanceTracker::carriers(const Contacts& contacts, double dt) const {
   std::array<bool, 2> out = contacts.on;
   const auto [left, right] = contacts.probability;
   if (!out[0] && !out[1]) {
@@ -100,7 +102,7 @@ std::array<bool, 2> StanceTracker::carriers(const Contacts& contacts) const {
   if (!out[0] || !out[1]) return out;
   // A foot that has just come down settles first, while the other carries.
   const std::size_t newer = contacts.phase(0) < contacts.phase(1) ? 0 : 1;
-  if (contacts.phase(newer) < config_.entry_delay && contacts.phase(1 - newer) > contacts.phase(newer)) out[newer] = false;
+  if (contacts.phase(newer) + dt < config_.entry_delay && contacts.phase(1 - newer) > contacts.phase(newer)) out[newer] = false;
   return out;
 }
 
@@ -132,7 +134,7 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
   out.t = feet.t;
   out.dt = last_ ? std::clamp(to_seconds(feet.t - *last_), shortest_step, longest_step) : longest_step;
   last_ = feet.t;
-  const std::array<bool, 2> carries = carriers(contacts);
+  const std::array<bool, 2> carries = carriers(contacts, out.dt);
   out.velocity_sigma = noise_.horizontal();
   out.vertical_velocity_sigma = noise_.vertical();
   out.gyro_bias = standing_rate_.add(feet, contacts, omega + x.bg);
@@ -141,7 +143,8 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     Stance& foot = out.foot[side];
     foot.ends = std::exchange(leave_[side], false);
     foot.R_IF = pose.R_IF;
-    const double phase = contacts.phase(side);
+    // It came down at some time since the sample before the one that shows it.
+    const double phase = contacts.phase(side) + out.dt;
     const double rolling = std::max(rolling_speed, rolling_share * contacts.sole_speed);
     const auto weights = share_of_corners(pose, x, omega, rolling);
     if (stuck(side, feet, omega) || !carries[side]) {
@@ -170,7 +173,8 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     const double entering = std::clamp(1.0 - (phase - config_.entry_delay) / entry_time, 0.0, 1.0);
     // As much as the noise across on all three axes, and as supporting soles usually seem to move, is no motion.
     const double loose = 1.0 + std::max(0.0, moving2 / noise2 - 3.0) + (loosest - 1) * entering;
-    foot.variance_scale = std::min(loose / std::max(0.01, contacts.probability[side]), loosest * loosest);
+    const double lighter = carries[1 - side] ? std::max(1.0, contacts.load[1 - side] / std::max(least_load, contacts.load[side])) : 1.0;
+    foot.variance_scale = std::min(lighter * loose / std::max(0.01, contacts.probability[side]), loosest * loosest);
   }
   return out;
 }

@@ -36,7 +36,8 @@ class StanceTracker {
  private:
   using Weights = std::array<double, max_corners>;
   std::optional<GroundPatch> ground_under(const VoxelMap& map, const Eigen::Vector3d& p_W, const Eigen::Vector3d& up_W, Ground ground);
-  std::array<bool, 2> carriers(const Contacts& contacts) const;
+  /// `dt`: since the sample before, s.
+  std::array<bool, 2> carriers(const Contacts& contacts, double dt) const;
   std::optional<GroundPatch> level_with_other(std::size_t side, const Eigen::Vector3d& p_W, const State& x,
                                               const Eigen::Vector3d& normal_W);
   bool stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
+#include <optional>
 
 #include "kilvo/filter/predict.hpp"
 #include "kilvo/filter/update.hpp"
@@ -241,7 +242,9 @@ TEST(StanceTracker, AFootEntersAfterItsDelayLooselyAndLeavesWithItsContact) {
       }
       left += foot.ends ? 1 : 0;
       const bool settled = foot.used && contacts.contacts().phase(side) > 0.1 && gait.stands(side, s);
-      loose += settled && foot.variance_scale > 1.1 ? 1 : 0;
+      const auto& load = contacts.contacts().load;
+      const double lighter = step.foot[1 - side].used ? std::max(1.0, load[1 - side] / std::max(0.01, load[side])) : 1.0;
+      loose += settled && foot.variance_scale > 1.1 * lighter ? 1 : 0;
       inside[side] = foot.used;
     }
   }
@@ -291,6 +294,53 @@ TEST(StanceTracker, WhenNoFootIsBelievedTheMoreProbableCarriesUnlessTheBodyFalls
   feet.t += std::chrono::milliseconds(1);
   const LegStep flying = tracker.step(feet, contacts, body, Eigen::Vector3d::Zero());
   EXPECT_FALSE(flying.foot[0].used || flying.foot[1].used);
+}
+
+TEST(StanceTracker, OfTwoFeetThatStandTheLighterOneCountsByItsLoadAndOneAloneInFull) {
+  const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
+  const auto scales = [&body](double left, bool right_stands) {
+    StanceTracker tracker{LegConfig{}};
+    Feet feet;
+    feet.t = test::gait_begin;
+    feet.foot = {test::seen_from(body, standing(0)), test::seen_from(body, standing(1))};
+    Contacts contacts;
+    contacts.t = feet.t;
+    contacts.since.fill(feet.t - std::chrono::seconds(1));
+    contacts.on[1] = right_stands;
+    contacts.load = {left, 1 - left};
+    const LegStep step = tracker.step(feet, contacts, body, Eigen::Vector3d::Zero());
+    return std::array{step.foot[0].variance_scale, step.foot[1].variance_scale};
+  };
+  EXPECT_NEAR(scales(0.5, true)[0], 1, 1e-9);
+  EXPECT_NEAR(scales(0.5, true)[1], 1, 1e-9);
+  EXPECT_NEAR(scales(0.2, true)[0], 4, 1e-9);
+  EXPECT_NEAR(scales(0.2, true)[1], 1, 1e-9);
+  EXPECT_NEAR(scales(0.0, true)[0], 100, 1e-9) << "bounded";
+  EXPECT_NEAR(scales(0.2, false)[0], 1, 1e-9) << "it carries all";
+}
+
+TEST(StanceTracker, AtALowRateAFootDoesNotWaitForASampleMoreThanItsDelay) {
+  for (const double rate : {50.0, 100.0, 1000.0}) {
+    LegConfig config;
+    StanceTracker tracker(config);
+    const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
+    Feet feet;
+    feet.foot = {test::seen_from(body, standing(0)), test::seen_from(body, standing(1))};
+    Contacts contacts;
+    contacts.since.fill(test::gait_begin - std::chrono::seconds(1));
+    std::optional<double> entered;
+    for (int i = -5; !entered && i < 100; ++i) {
+      contacts.t = feet.t = test::gait_begin + from_seconds(i / rate);
+      contacts.on[1] = i >= 0;
+      if (i == 0) contacts.since[1] = feet.t;
+      const LegStep step = tracker.step(feet, contacts, body, Eigen::Vector3d::Zero());
+      if (step.foot[1].used) entered = i / rate;
+    }
+    ASSERT_TRUE(entered);
+    // It came down between the sample that shows it and the one before.
+    EXPECT_LE(*entered, config.entry_delay + 1e-9) << rate << " Hz";
+    EXPECT_GE(*entered + 1 / rate, config.entry_delay - 1e-9) << rate << " Hz";
+  }
 }
 
 TEST(StanceTracker, AFootWhoseEncodersAreFrozenWhileTheBodyTurnsIsNotUsed) {

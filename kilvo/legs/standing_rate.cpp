@@ -1,26 +1,95 @@
 #include "kilvo/legs/standing_rate.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace kilvo {
 namespace {
 
-constexpr double window = 0.5;        // s
+constexpr double block = 0.1;         // s
 constexpr double surely = 0.9;        // probability of each foot, throughout
 constexpr double longest_gap = 0.05;  // s, between samples
-// No window says more than this, rad/s: the soles give way, and the next windows say the same.
-constexpr double least_sigma = 3e-4;
-constexpr double shortest_correlation = 0.01;  // s, of the gyro's noise while the robot stands
-// What says less is sway, which is not as white as it is taken: not used, rad/s.
+constexpr std::size_t shortest = 15;  // blocks of a line
+constexpr std::size_t settling = 5;   // blocks: a stand settles for any number of these first
+// White noise of the gyro over half a second, rad/s: it is in the angle's slope and not beside its line.
+constexpr double white = 3e-4, white_time = 0.5;
+// Before anything is seen of how a standing body sways, rad, as so many angles say.
+constexpr double usual_sway = 1e-3, usual_count = 2;
+constexpr double hidden = 0.5;  // of a turn, by soles and joints that give way
+// What says less is the beginning of a walk, or sway that is slower than the stand, rad/s.
 constexpr double largest_sigma = 1e-3;
 
 }  // namespace
 
-void StandingRate::begin(const Feet& feet) {
-  begin_ = last_ = feet.t;
+void StandingRate::begin_block(const Feet& feet) {
+  begin_ = feet.t;
   for (std::size_t side = 0; side < 2; ++side) R_IF_[side] = feet.foot[side].R_IF;
   turned_.setZero();
-  squares_.setZero();
+}
+
+void StandingRate::close_block(const Feet& feet) {
+  const Angles& before = angles_[count_ - 1];
+  const Eigen::Vector3d left = (R_IF_[0] * feet.foot[0].R_IF.inverse()).Log(), right = (R_IF_[1] * feet.foot[1].R_IF.inverse()).Log();
+  const Eigen::Vector3d soles = 0.5 * (left + right);
+  angles_[count_] = {before.time + to_seconds(feet.t - begin_), before.beyond + turned_ - soles, before.soles + soles,
+                     before.apart + 0.5 * (left - right)};
+  ++count_;
+  begin_block(feet);
+}
+
+// The line through the angles from `first` on.
+GyroBiasReading StandingRate::line(std::size_t first) const {
+  const auto n = static_cast<double>(count_ - first);
+  double time = 0, squares = 0;
+  Eigen::Vector3d beyond = Eigen::Vector3d::Zero(), products = Eigen::Vector3d::Zero(), turn = Eigen::Vector3d::Zero(),
+                  apart = Eigen::Vector3d::Zero();
+  for (std::size_t i = first; i < count_; ++i) {
+    time += angles_[i].time / n;
+    beyond += angles_[i].beyond / n;
+  }
+  for (std::size_t i = first; i < count_; ++i) {
+    const double since = angles_[i].time - time;
+    squares += since * since;
+    products += since * (angles_[i].beyond - beyond);
+    turn += since * angles_[i].soles;
+    apart += since * angles_[i].apart;
+  }
+  GyroBiasReading out;
+  out.bias = products / squares;
+  // Of first order: how much an angle beside the line is like the one before it.
+  double beside = 0, together = 0;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  for (std::size_t i = first; i < count_; ++i) {
+    const Eigen::Vector3d off = angles_[i].beyond - beyond - (angles_[i].time - time) * out.bias;
+    beside += off.squaredNorm();
+    together += off.dot(before);
+    before = off;
+  }
+  const double alike = std::clamp(together / std::max(beside, 1e-12), 0.0, 0.95);
+  const double variance = (beside + usual_count * usual_sway * usual_sway) / (3 * (n - 2) + usual_count);
+  // Soles that give way hide a part of a turn, and what they do not agree upon is at least as much.
+  const double unseen2 = (hidden * hidden * turn.squaredNorm() + apart.squaredNorm()) / (squares * squares);
+  const double white2 = white * white * white_time / (angles_[count_ - 1].time - angles_[first].time);
+  out.sigma = std::sqrt(variance * (1 + alike) / (1 - alike) / squares + unseen2 + white2);
+  return out;
+}
+
+// Of the lines that leave out the settling, the one that is known best; and of that, what has not been said.
+std::optional<GyroBiasReading> StandingRate::news() {
+  if (count_ < shortest || count_ % settling != 0) return std::nullopt;  // seldom, since many lines take their time
+  GyroBiasReading best = line(0);
+  for (std::size_t first = settling; first + shortest <= count_; first += settling) {
+    const GyroBiasReading shorter = line(first);
+    if (shorter.sigma < best.sigma) best = shorter;
+  }
+  constexpr double more = 1.3;
+  const double known = 1 / (best.sigma * best.sigma), said = said_.sigma > 0 ? 1 / (said_.sigma * said_.sigma) : 0;
+  if (best.sigma > largest_sigma || known < more * said) return std::nullopt;
+  GyroBiasReading out;
+  out.bias = (known * best.bias - said * said_.bias) / (known - said);
+  out.sigma = 1 / std::sqrt(known - said);
+  said_ = best;
+  return out;
 }
 
 std::optional<GyroBiasReading> StandingRate::add(const Feet& feet, const Contacts& contacts, const Eigen::Vector3d& gyro) {
@@ -28,31 +97,22 @@ std::optional<GyroBiasReading> StandingRate::add(const Feet& feet, const Contact
   constexpr int fewest_corners = 3;
   const bool stands = contacts.probability[0] > surely && contacts.probability[1] > surely && feet.foot[0].corners >= fewest_corners &&
                       feet.foot[1].corners >= fewest_corners;
-  const double dt = begin_ ? to_seconds(feet.t - last_) : 0;
-  if (!stands || dt > longest_gap) begin_.reset();
+  const double dt = stands_ ? to_seconds(feet.t - last_) : 0;
+  last_ = feet.t;
+  const bool goes_on = stands && stands_ && dt <= longest_gap && count_ < most;
+  stands_ = stands;
   if (!stands) return std::nullopt;
-  if (!begin_) {
-    begin(feet);
+  if (!goes_on) {
+    angles_[0] = {};
+    count_ = 1;
+    said_ = {};
+    begin_block(feet);
     return std::nullopt;
   }
-  last_ = feet.t;
   turned_ += dt * gyro;
-  squares_ += dt * gyro.cwiseAbs2();
-  const double time = to_seconds(feet.t - *begin_);
-  if (time < window) return std::nullopt;
-  // The body's turn between the ends as each sole sees it, R_I0_I1.
-  std::array<Eigen::Vector3d, 2> seen;
-  for (std::size_t side = 0; side < 2; ++side) seen[side] = (R_IF_[side] * feet.foot[side].R_IF.inverse()).Log() / time;
-  const Eigen::Vector3d mean = turned_ / time, variance = (squares_ / time - mean.cwiseAbs2()).cwiseMax(0);
-  GyroBiasReading out;
-  out.bias = mean - 0.5 * (seen[0] + seen[1]);
-  // What the soles do not agree upon, what one sample of the gyro varies by, and what joints and soles that give way may hide of a turn.
-  const double turn = 0.5 * (seen[0] + seen[1]).norm();
-  out.sigma = std::sqrt(least_sigma * least_sigma + 0.25 * (seen[0] - seen[1]).squaredNorm() + turn * turn +
-                        variance.maxCoeff() * shortest_correlation / time);
-  begin(feet);
-  if (out.sigma > largest_sigma) return std::nullopt;
-  return out;
+  if (to_seconds(feet.t - begin_) < block) return std::nullopt;
+  close_block(feet);
+  return news();
 }
 
 }  // namespace kilvo

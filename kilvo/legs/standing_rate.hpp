@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <optional>
 
 #include "kilvo/legs/contact_estimator.hpp"
@@ -16,18 +17,35 @@ struct GyroBiasReading {
   double sigma = 0;
 };
 
+/// The angle between what the gyro adds up to and what the soles see grows by the bias. A body that sways on soles that give way and
+/// encoders of coarse steps leave an error that does not grow: the bias is the slope of the line through the angle over the whole stand,
+/// and what the angle deviates from that line tells how well it is known.
 class StandingRate {
  public:
-  /// One leg sample; `gyro` as measured, rad/s. A reading at the end of each window in which both feet have stood.
+  /// One leg sample; `gyro` as measured, rad/s. A reading whenever the stand knows twice as much as it has said; each says what is new.
   std::optional<GyroBiasReading> add(const Feet& feet, const Contacts& contacts, const Eigen::Vector3d& gyro);
 
  private:
-  void begin(const Feet& feet);
+  static constexpr std::size_t most = 128;  // blocks of a stand
+  void begin_block(const Feet& feet);
+  void close_block(const Feet& feet);
+  GyroBiasReading line(std::size_t first) const;
+  std::optional<GyroBiasReading> news();
 
-  std::optional<Time> begin_;
-  Time last_{};
-  std::array<SO3, 2> R_IF_;  // at the beginning
-  Eigen::Vector3d turned_ = Eigen::Vector3d::Zero(), squares_ = Eigen::Vector3d::Zero();
+  bool stands_ = false;
+  Time begin_{}, last_{};    // of the block, of the last sample
+  std::array<SO3, 2> R_IF_;  // at the beginning of the block
+  Eigen::Vector3d turned_ = Eigen::Vector3d::Zero();
+  // At the ends of the blocks, since the stand began.
+  struct Angles {
+    double time = 0;                                   // s
+    Eigen::Vector3d beyond = Eigen::Vector3d::Zero();  // of the gyro beyond the soles, rad
+    Eigen::Vector3d soles = Eigen::Vector3d::Zero();   // turn of the body as the soles see it
+    Eigen::Vector3d apart = Eigen::Vector3d::Zero();   // half of what they do not agree upon
+  };
+  std::array<Angles, most> angles_{};
+  std::size_t count_ = 0;
+  GyroBiasReading said_;  // of this stand; sigma 0: nothing
 };
 
 }  // namespace kilvo
