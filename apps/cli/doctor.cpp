@@ -48,7 +48,7 @@ lab::RecordingOptions recording_options(const DoctorOptions& options, const lab:
 lab::Recorded record(const DoctorOptions& options, lab::RecordingOptions wanted) {
   const auto read = [&options](const lab::RecordingOptions& what) {
     lab::RecordingSource source(options.input, what);
-    lab::Recorder recorder;
+    lab::Recorder recorder(what.leg_clock.has_value());
     while (const auto measurement = source.next()) recorder.push(*measurement);
     return recorder.finish();
   };

@@ -56,13 +56,18 @@ void ResultFiles::write_sweep(const Output& output) {
 }
 
 void ResultFiles::write_events(const std::vector<Event>& events) {
-  for (const Event& event : events) {
-    std::string line, text = text_of(event);
-    lab::append_seconds(line, event.t);
-    for (std::size_t quote = text.find('"'); quote != std::string::npos; quote = text.find('"', quote + 2)) text.insert(quote, 1, '"');
-    events_.write(
-        fmt::format("{},{},{},{:.9g},\"{}\"", line, event.sensor ? name_of(*event.sensor) : "", name_of(event.reason), event.value, text));
-  }
+  for (const Event& e : events) write_event(e.t, e.sensor ? name_of(*e.sensor) : "", name_of(e.reason), e.value, text_of(e));
+}
+
+void ResultFiles::write_description(Time t, Sensor sensor, bool spoils, double size, const std::string& text) {
+  write_event(t, name_of(sensor), spoils ? "description_wrong" : "description_doubted", size, text);
+}
+
+void ResultFiles::write_event(Time t, const std::string& sensor, const std::string& reason, double value, std::string text) {
+  std::string line;
+  lab::append_seconds(line, t);
+  for (std::size_t quote = text.find('"'); quote != std::string::npos; quote = text.find('"', quote + 2)) text.insert(quote, 1, '"');
+  events_.write(fmt::format("{},{},{},{:.9g},\"{}\"", line, sensor, reason, value, text));
 }
 
 void ResultFiles::write_contacts(const Output& output) {

@@ -23,6 +23,8 @@ class ResultFiles {
   void write_state(const Output& output);
   void write_sweep(const Output& output);
   void write_events(const std::vector<Event>& events);
+  /// What the data say against the description, as an event.
+  void write_description(Time t, Sensor sensor, bool spoils, double size, const std::string& text);
   void close();
 
   const RunSummary& run_summary() const { return run_summary_; }
@@ -31,6 +33,7 @@ class ResultFiles {
   void write_full_state(const Output& output);
   void write_modality(const Output& output);
   void write_stages(const Output& output);
+  void write_event(Time t, const std::string& sensor, const std::string& reason, double value, std::string text);
   void write_contacts(const Output& output);
   void write_indicators(const Output& output);
 

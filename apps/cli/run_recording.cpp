@@ -6,7 +6,6 @@
 #include <memory>
 #include <utility>
 
-#include "apps/cli/description_watch.hpp"
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/held_output.hpp"
 #include "apps/cli/interrupt.hpp"
@@ -24,6 +23,7 @@
 #include "apps/live/live_runner.hpp"
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/estimator/levelling.hpp"
+#include "lab/doctor/description_watch.hpp"
 #include "lab/mapping/ply.hpp"
 #include "lab/run_log/run_log.hpp"
 
@@ -32,20 +32,14 @@ namespace {
 
 std::vector<std::filesystem::path> paths_of(const std::vector<std::string>& words) { return {words.begin(), words.end()}; }
 
-double mount_rate(const Robot& robot, Sensor sensor) {
-  const double rates[] = {robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate};
-  return rates[static_cast<std::size_t>(sensor)];
-}
-
-double mount_offset(const Robot& robot, Sensor sensor) {
-  const double offsets[] = {robot.imu.time_offset, robot.legs.time_offset, robot.lidar.time_offset, robot.camera.time_offset};
-  return offsets[static_cast<std::size_t>(sensor)];
-}
-
 lab::RecordingOptions recording_options(const RunOptions& options, const lab::Settings& settings, const std::vector<Sensor>& used) {
+  const Robot& robot = settings.robot;
+  const double rates[] = {robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate};
+  const double offsets[] = {robot.imu.time_offset, robot.legs.time_offset, robot.lidar.time_offset, robot.camera.time_offset};
   lab::RecordingOptions out;
   for (const Sensor sensor : used) {
-    out[sensor] = {true, settings.topic(sensor), mount_rate(settings.robot, sensor), mount_offset(settings.robot, sensor)};
+    const auto i = static_cast<std::size_t>(sensor);
+    out[sensor] = {true, settings.topic(sensor), rates[i], offsets[i]};
   }
   const bool with_legs = std::ranges::find(used, Sensor::legs) != used.end();
   if (with_legs && settings.leg_clock.clock != "stamp") out.leg_clock.emplace(settings.leg_clock, settings.robot);
@@ -81,7 +75,9 @@ class Run {
                                                           std::array{settings_.robot.feet[0].name, settings_.robot.feet[1].name})
                           : nullptr),
         skeleton_(options.out / "skeleton.csv", settings_.robot),
-        description_(settings_.robot, options.threads > 1 || options.realtime),
+        description_(
+            settings_.robot, settings_.leg_clock.clock != "stamp",
+            options.threads > 1 || options.realtime ? lab::DescriptionWatch::Judging::beside : lab::DescriptionWatch::Judging::here),
         progress_(Progress::style_for(options.quiet)) {
     if (!options.quiet) tell_start(facts_, source_, options.no_deskew);
   }
@@ -90,11 +86,11 @@ class Run {
     const bool interrupted = options_.realtime ? replay_live() : replay();
     progress_.finish();
     files_.write_events(estimator_.take_events());
+    facts_.failure = failure(interrupted);
+    if (!interrupted) settle_description();
     files_.close();
     if (log_) log_->close();
     skeleton_.close();
-    facts_.failure = failure(interrupted);
-    if (!interrupted) hold_against_description();
     for (const Sensor sensor : facts_.sensors) facts_.withheld[static_cast<std::size_t>(sensor)] = failing_.dropped(sensor);
     const lab::MapBuilder& map = map_.finish();
     if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map, levelling_.turn().value_or(SO3()));
@@ -106,12 +102,22 @@ class Run {
   }
 
  private:
-  // What the first seconds say about the description: a run with a wrong one has failed, however good it looks.
-  void hold_against_description() {
-    for (const lab::Finding& finding : description_.findings()) {
+  // Said as soon as the evidence is in; the files get it at the end, where it does not depend on how fast it was judged.
+  void hold_against_description(const Measurement& measurement) {
+    description_.take(measurement);
+    for (const auto& [finding, t, after, spoils] : description_.news()) {
+      progress_.finish();
+      fmt::print(stderr, "kilvo: {}: after {:.1f} s of data: {}\n", spoils ? "error" : "warning", after, finding.text);
+    }
+  }
+
+  // A run with a wrong description has failed, however good it looks.
+  void settle_description() {
+    for (const auto& [finding, t, after, spoils] : description_.finish()) {
       facts_.warnings.push_back(fmt::format("{}; {}", finding.text, finding.remedy));
-      if (!facts_.failure.empty() || !DescriptionWatch::spoils(finding)) continue;
-      facts_.failure = fmt::format("the robot's description is wrong: {} (kilvo doctor shows the evidence)", finding.text);
+      files_.write_description(t, finding.sensor, spoils, finding.size, facts_.warnings.back());
+      if (facts_.failure.empty() && spoils)
+        facts_.failure = fmt::format("the robot's description is wrong: {} (kilvo doctor shows the evidence)", finding.text);
     }
   }
 
@@ -123,7 +129,7 @@ class Run {
     while (auto measurement = input.next()) {
       require_legs(*measurement);
       skeleton_.add(*measurement);
-      description_.take(*measurement);
+      hold_against_description(*measurement);
       keep(estimator_.push(*std::move(measurement)));
       progress_.update(input.progress(), [this] { return progress_note(); });
       interrupted = interrupt_.requested();
@@ -156,7 +162,7 @@ class Run {
     while (auto measurement = input.next()) {
       require_legs(*measurement);
       skeleton_.add(*measurement);
-      description_.take(*measurement);
+      hold_against_description(*measurement);
       interrupted = !pace.wait_for(input.arrived(), interrupt_);
       if (interrupted || runner.failed()) break;
       runner.push(*std::move(measurement));
@@ -256,7 +262,7 @@ class Run {
   ResultFiles files_;
   std::unique_ptr<lab::RunLog> log_;
   SkeletonFile skeleton_;
-  DescriptionWatch description_;
+  lab::DescriptionWatch description_;
   Levelling levelling_;
   std::vector<HeldOutput> waiting_;  // until the world is level
   Progress progress_;

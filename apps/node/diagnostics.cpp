@@ -38,11 +38,24 @@ std::optional<Trouble> trouble_of(Sensor sensor, const Condition& c) {
   return std::nullopt;
 }
 
+std::string text_of(const lab::WrongDescription& wrong) { return fmt::format("{}; {}", wrong.finding.text, wrong.finding.remedy); }
+
+// A sensor that is there, and is not as described.
+std::optional<Trouble> doubt_of(Sensor sensor, const Condition& c) {
+  std::optional<Trouble> out;
+  for (const lab::WrongDescription& wrong : c.wrong) {
+    if (wrong.finding.sensor != sensor || (out && !wrong.spoils)) continue;
+    out = {wrong.spoils ? DiagnosticStatus::error : DiagnosticStatus::warn, "not as described: " + text_of(wrong)};
+    if (wrong.spoils) break;
+  }
+  return out;
+}
+
 DiagnosticStatus status_of(Sensor sensor, const Condition& c) {
   const auto s = static_cast<std::size_t>(sensor);
   const InputState& input = c.inputs[s];
   DiagnosticStatus out = named(name_of(sensor));
-  const Trouble trouble = trouble_of(sensor, c).value_or(Trouble{DiagnosticStatus::ok, "ok"});
+  const Trouble trouble = trouble_of(sensor, c).value_or(doubt_of(sensor, c).value_or(Trouble{DiagnosticStatus::ok, "ok"}));
   say(out, trouble.level, trouble.text);
   add(out, "topic", input.topic);
   add(out, "messages", std::to_string(input.messages));
@@ -83,6 +96,11 @@ DiagnosticStatus status_of_estimate(const Condition& c) {
   if (!lost.empty()) text += ", lost: " + lost;
   if (!c.base_waits_for.empty()) text += ", " + c.base_waits_for;
   if (c.seen.diverged) text += ", diverged";
+  for (const lab::WrongDescription& wrong : c.wrong) {
+    if (!wrong.spoils) continue;
+    level = DiagnosticStatus::error;
+    text += ", the description of the robot is wrong: " + wrong.finding.text;
+  }
   say(out, level, text);
   add(out, "modality", name_of(e.modality));
   add(out, "cause", text_of(e.cause));
@@ -93,6 +111,7 @@ DiagnosticStatus status_of_estimate(const Condition& c) {
   add(out, "states thrown away", std::to_string(c.seen.rollbacks));
   add(out, "sweeps not mapped in time", std::to_string(c.clouds_given_up));
   for (const std::string& warning : warnings_of(c.seen)) add(out, "warning", warning);
+  for (const lab::WrongDescription& wrong : c.wrong) add(out, "description", text_of(wrong));
   return out;
 }
 

@@ -4,10 +4,12 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/node/output_messages.hpp"
 #include "apps/node/sensor_inputs.hpp"
 #include "apps/node/state_publisher.hpp"
+#include "lab/doctor/description_watch.hpp"
 
 namespace kilvo::node {
 
@@ -22,6 +24,7 @@ struct Condition {
   std::string base_waits_for;  // which joints, so that there is a pose of the base
   std::string legs_mismatch;   // why the legs' messages are not of this robot
   std::uint64_t clouds_given_up = 0;
+  std::vector<lab::WrongDescription> wrong;  // what the data say against the description of the robot
 };
 
 /// One status of the estimate, one for each configured sensor; those that something is wrong with say what in their message.

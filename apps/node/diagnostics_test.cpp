@@ -50,6 +50,21 @@ TEST(Diagnostics, NameEachLostSensorWithinHalfASecond) {
   }
 }
 
+TEST(Diagnostics, AreAtErrorWhenTheDescriptionIsWrong) {
+  Condition c = all_is_well();
+  lab::WrongDescription wrong;
+  wrong.finding.sensor = Sensor::lidar;
+  wrong.finding.text = "the LiDAR is turned";
+  wrong.finding.remedy = "lidar.T_imu_lidar.R: []";
+  wrong.spoils = true;
+  c.wrong.push_back(wrong);
+  const auto all = statuses(c);
+  EXPECT_EQ(+all.front().level, +DiagnosticStatus::error);
+  EXPECT_NE(all.front().message.find("the LiDAR is turned"), std::string::npos);
+  EXPECT_EQ(message_of(all, "kilvo: lidar"), "not as described: the LiDAR is turned; lidar.T_imu_lidar.R: []");
+  EXPECT_EQ(message_of(all, "kilvo: imu"), "ok") << "nobody else is accused";
+}
+
 TEST(Diagnostics, SayWhyASensorIsNotUsed) {
   Condition c = all_is_well();
   c.inputs[0].last.reset();

@@ -44,6 +44,7 @@ Node::Node(const Options& options, const lab::Settings& settings, Outlet outlet,
       base_(options_, settings_),
       states_(options_, settings_, base_, outlet_),
       map_(options_.map_frame, settings_.mapping, outlet_),
+      description_(settings_.robot, settings_.leg_clock.clock != "stamp", lab::DescriptionWatch::Judging::live),
       inputs_(
           settings_, options_.no_deskew, [this](Measurement m, Time arrived) { push(std::move(m), arrived); }, say_) {
   try {
@@ -78,6 +79,7 @@ void Node::push(Measurement m, Time) {
     if (!is_of_this_robot(*joints)) return;
     base_.take(*joints);
   }
+  description_.take(m);
   const std::shared_lock lock(life_mutex_);
   if (life_) life_->runner.push(std::move(m));
 }
@@ -109,6 +111,7 @@ Condition Node::condition() const {
   }
   out.base_waits_for = base_.waiting_for();
   out.clouds_given_up = map_.given_up();
+  out.wrong = wrong_;
   const std::lock_guard lock(mismatch_mutex_);
   out.legs_mismatch = legs_mismatch_;
   return out;
@@ -116,6 +119,11 @@ Condition Node::condition() const {
 
 void Node::tick(Time time) {
   states_.publish_path();
+  for (lab::WrongDescription& wrong : description_.news()) {
+    say_(fmt::format("the description of the robot: {}; {}", wrong.finding.text, wrong.finding.remedy));
+    if (wrong.spoils) states_.distrust();
+    wrong_.push_back(std::move(wrong));
+  }
   const Condition now = condition();
   Diagnostics message;
   message.status = statuses(now);

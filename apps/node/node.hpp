@@ -16,6 +16,7 @@
 #include "apps/node/outlet.hpp"
 #include "apps/node/sensor_inputs.hpp"
 #include "apps/node/state_publisher.hpp"
+#include "lab/doctor/description_watch.hpp"
 
 namespace kilvo::node {
 
@@ -76,6 +77,7 @@ class Node {
   StatePublisher states_;
   MapThread map_;
   std::optional<LegKinematics> kinematics_;  // of the thread of IMU and legs
+  lab::DescriptionWatch description_;
 
   mutable std::shared_mutex life_mutex_;  // exclusive while one life ends and the next begins
   std::unique_ptr<Life> life_;
@@ -84,6 +86,7 @@ class Node {
 
   // Of the thread that ticks:
   std::string last_essence_;
+  std::vector<lab::WrongDescription> wrong_;
   SteadyClock::time_point last_diagnostics_{};
 
   SensorInputs inputs_;  // last: it feeds all of the above

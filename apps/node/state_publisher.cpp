@@ -9,6 +9,7 @@ namespace {
 constexpr Duration path_period = std::chrono::milliseconds(100);
 constexpr double path_step = 0.02;          // m; a robot that stands leaves no trace
 constexpr std::size_t longest_path = 4000;  // poses
+constexpr double unknown = 1e4;             // m^2, rad^2, (m/s)^2, (rad/s)^2: of a state that nothing is known about
 
 Vector vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -39,7 +40,11 @@ StatePublisher::StatePublisher(const Options& options, const lab::Settings& sett
 void StatePublisher::take(const Output& output) {
   if (std::exchange(epoch_, output.epoch) != output.epoch) clear();
   const auto base = base_.newest();
-  const BodyMotion best = body_motion(output, base ? base->base : LinkMotion{}, rate_variance_);
+  BodyMotion best = body_motion(output, base ? base->base : LinkMotion{}, rate_variance_);
+  if (!trusted_) {
+    best.pose_covariance.diagonal().array() += unknown;
+    best.twist_covariance.diagonal().array() += unknown;
+  }
   note(output, best);
   if (!best.is_finite() || !base) return;
   const SE3 T_OI = smooth_.add(output);

@@ -1,6 +1,7 @@
 // Each state, as it comes, to who listens: odometry, transforms, contacts, the ground; and the way so far.
 #pragma once
 
+#include <atomic>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -34,6 +35,9 @@ class StatePublisher {
   /// Of the newest state; none before the first.
   std::optional<EstimateState> newest() const;
 
+  /// From now on nothing is claimed about how exact a state is: the description of the robot is wrong. From any thread.
+  void distrust() { trusted_ = false; }
+
   /// Sends the way so far, if it has grown and anyone listens. From any thread.
   void publish_path();
 
@@ -57,6 +61,7 @@ class StatePublisher {
   std::array<std::string, 2> feet_;
   SmoothOdometry smooth_;
   std::uint32_t epoch_ = 0;
+  std::atomic<bool> trusted_{true};
   std::optional<Time> last_tf_, last_ground_, last_path_;
 
   mutable std::mutex mutex_;

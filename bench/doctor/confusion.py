@@ -64,6 +64,8 @@ def description_cases(config, folder, work):
         out.append(("LiDAR position in mm", texts(key, p=1000 * p), ["lidar_position", "lidar_unit"]))
         for ms in (5, -20, 100, 1000):
             out.append((f"LiDAR clock {ms} ms", [f"lidar.time_offset={ms / 1000}"], ["lidar_clock"]))
+        if "camera" in config:
+            out.append(("LiDAR at the camera's place", texts(key, *pose(config["camera"]["T_imu_camera"])), ["lidar_rotation"]))
         out.append(("LiDAR rate", ["lidar.rate=20"], ["lidar_rate"]))
     if "legs" in config and config["legs"].get("type", "joints") == "joints":
         R, p = pose(config["imu"]["T_link_imu"])
@@ -92,6 +94,14 @@ def description_cases(config, folder, work):
             path = os.path.join(work, "hip.urdf")
             open(path, "w").write(re.sub(r'(<joint name="right_hip_roll_joint".*?<axis xyz=")([^"]+)(")', lambda m: m.group(1) + " ".join(str(-float(x)) for x in m.group(2).split()) + m.group(3), text, flags=re.S))
             out.append(("hip roll's sign", ["robot.urdf=" + path], ["joint_sign"]))
+        out.append(("IMU turned by 45 on its link", texts(key, rotation("z", 45) @ R), ["imu_mount_rotation"]))
+        half = os.path.join(work, "half.urdf")
+        open(half, "w").write(re.sub(r'(<origin[^>]*xyz=")([^"]+)"', lambda m: m.group(1) + " ".join(f"{0.5 * float(x):.9g}" for x in m.group(2).split()) + '"', text))
+        out.append(("URDF of half the size", ["robot.urdf=" + half], ["leg_lengths", "urdf"]))
+        if "waist" in text:
+            waist = os.path.join(work, "waist.urdf")
+            open(waist, "w").write(re.sub(r'(<joint name="waist[^"]*".*?<axis xyz=")([^"]+)(")', lambda m: m.group(1) + " ".join(str(-float(x)) for x in m.group(2).split()) + m.group(3), text, count=1, flags=re.S))
+            out.append(("waist's sign", ["robot.urdf=" + waist], ["joint_sign"]))
         out.append(("legs' rate", ["legs.rate=200"], ["legs_rate"]))
     for ms in (20, 300):
         out.append((f"IMU clock {ms} ms", [f"imu.time_offset={ms / 1000}"], ["imu_clock"] if "lidar" in config else ["imu_clock", "legs_clock"]))
@@ -106,6 +116,7 @@ def description_cases(config, folder, work):
         out.append(("camera's fx halved", [f"camera.fx={config['camera']['fx'] / 2}"], ["camera_focal"]))
         out.append(("camera's fx and fy halved", [f"camera.fx={config['camera']['fx'] / 2}", f"camera.fy={config['camera']['fy'] / 2}"], ["camera_focal"]))
         out.append(("camera's cx and cy swapped", [f"camera.cx={config['camera']['cy']}", f"camera.cy={config['camera']['cx']}"], ["camera_principal_point"]))
+        out.append(("camera position in mm", texts(key, p=1000 * np.maximum(np.abs(p), 0.02)), ["camera_unit"]))
         out.append(("camera's size", ["camera.width=1280", "camera.height=1024"], ["camera_size"]))
         for ms in (10, 200):
             out.append((f"camera's clock {ms} ms", [f"camera.time_offset={ms / 1000}"], ["camera_clock"]))
@@ -155,6 +166,39 @@ def in_degrees(m):
     m.velocity = [math.degrees(q) for q in m.velocity]
 
 
+def offset_of(joint, turn):
+    def change(m):
+        m.position = [q + (turn if n == joint else 0) for n, q in zip(m.name, m.position)]
+    return change
+
+
+def exchanged(a, b):
+    def change(m):
+        m.name = [b if n == a else a if n == b else n for n in m.name]
+    return change
+
+
+def without_gravity():
+    mean = []
+
+    def change(w, a):
+        if not mean:
+            mean.append(a.copy())
+        mean[0] += 0.002 * (a - mean[0])
+        return w, a - mean[0]
+    return change
+
+
+def mirrored(sensor, m):
+    if sensor == "lidar":
+        field = [f for f in m.fields if f.name == "z"][0]
+        raw = np.frombuffer(bytearray(m.data), np.uint8).reshape(-1, m.point_step).copy()
+        z = -raw[:, field.offset:field.offset + 4].copy().view("<f4")
+        raw[:, field.offset:field.offset + 4] = z.view(np.uint8)
+        m.data = raw.tobytes()
+    return m
+
+
 def reversed_times(sensor, m):
     if sensor == "lidar":
         field = [f for f in m.fields if f.name in ("timestamp", "time", "t", "offset_time")][0]
@@ -183,6 +227,14 @@ def data_cases(config):
            ("IMU's y flipped", turned(flip), ["imu_axes"]),
            ("gyro's signs flipped", each_imu(lambda w, a: (-w, a)), ["imu_axes"]),
            ("accelerometer's signs flipped", each_imu(lambda w, a: (w, -a)), ["imu_axes"])]
+    out += [("gyro's axes permuted", each_imu(lambda w, a: (w[[1, 2, 0]], a)), ["imu_axes"]),
+            ("IMU yawed by 45", turned(rotation("z", 45)), ["imu_rotated"]),
+            ("accelerometer without gravity", each_imu(without_gravity()), ["accel_gravity"])]
+    if "legs" in config:
+        out += [("hip pitch off by 90", each_legs(offset_of("left_hip_pitch_joint", math.pi / 2)), ["joint_offset"]),
+                ("hip roll and yaw of one leg exchanged", each_legs(exchanged("left_hip_roll_joint", "left_hip_yaw_joint")), ["joints_exchanged"])]
+    if "lidar" in config:
+        out.append(("LiDAR's z flipped", mirrored, ["lidar_axes"]))
     if "legs" in config:
         out += [("joints in degrees", each_legs(in_degrees), ["joint_unit"]), ("left and right swapped", each_legs(swap_sides), ["joints_swapped"]),
                 ("names shifted by one", each_legs(shift), ["joint_names_shifted"]),

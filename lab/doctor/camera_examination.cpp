@@ -75,6 +75,20 @@ void Examination::examine_camera() {
   const auto& stamps = recorded_.stamps[static_cast<std::size_t>(Sensor::camera)];
   if (stamps.count < 10) return;
   CameraMount& m = robot_.camera;
+  constexpr double on_the_robot = 3;  // m
+  if (m.T_imu_camera.p.norm() > on_the_robot) {
+    const Eigen::Vector3d right = 1e-3 * m.T_imu_camera.p;
+    find({Sensor::camera,
+          "camera_unit",
+          fmt::format("the camera's position of {:.0f} m on the IMU is in millimetres", m.T_imu_camera.p.norm()),
+          "no robot is as large",
+          "camera.T_imu_camera.p: " + vector_text(right),
+          m.T_imu_camera.p.norm(),
+          "m",
+          {{"camera.T_imu_camera.p", vector_text(right)}},
+          true});
+    m.T_imu_camera.p = right;
+  }
   if (recorded_.image_width != m.width || recorded_.image_height != m.height) {
     const std::string is = fmt::format("{} x {}", recorded_.image_width, recorded_.image_height);
     find({Sensor::camera,

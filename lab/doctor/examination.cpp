@@ -37,8 +37,9 @@ std::string turn_text(const SO3& turn) {
 }
 
 bool Diagnosis::unknown() const {
+  // Rates and units are right on a robot that stands still, too.
   return findings.empty() && std::ranges::none_of(checks, [](const Check& c) {
-           return c.verdict == Check::Verdict::good || c.verdict == Check::Verdict::note;
+           return (c.verdict == Check::Verdict::good || c.verdict == Check::Verdict::note) && !c.at_rest;
          });
 }
 
@@ -112,7 +113,9 @@ std::vector<InertialSample> Examination::mended_imu() const {
 LidarWay Examination::lidar_way() const {
   const std::vector<SweepPose> none;
   const TranslationFit fit = translation_.value_or(TranslationFit{});
-  return {translation_ ? way_ : none, robot_.lidar.T_imu_lidar, lidar_offset_, mended_imu(), gyro(), fit.g_W, fit.ba};
+  SE3 T_IL = robot_.lidar.T_imu_lidar;
+  if (lidar_.known) T_IL.R = SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix());
+  return {translation_ ? way_ : none, T_IL, lidar_offset_, mended_imu(), gyro(), fit.g_W, fit.ba};
 }
 
 SenseAgreement Examination::agreement(const std::vector<Turn>& turns, const SO3& mount, double least_explained) const {
@@ -160,6 +163,8 @@ Diagnosis Examination::run() {
   examine_upright();
   examine_camera();
   blame_imu_for_all();
+  const bool legs = recorded_.legs.size() >= 100 && robot_.legs.type == "joints";
+  diagnosis_.settled = (recorded_.sweeps.size() < 30 || lidar_.known) && (!legs || (legs_.known && legs_turned()));
   return diagnosis_;
 }
 

@@ -11,6 +11,7 @@
 #include "lab/doctor/recorded.hpp"
 #include "lab/doctor/refinement.hpp"
 #include "lab/doctor/scan_odometry.hpp"
+#include "lab/doctor/stance_fit.hpp"
 #include "lab/doctor/translation_fit.hpp"
 #include "lab/doctor/turns.hpp"
 
@@ -49,6 +50,8 @@ class Examination {
   void agree_with_gyro();
   void settle_axes();
   void accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence);
+  /// `only_calm`: none when what the accelerometer measures does not average to gravity.
+  std::optional<double> tilt_under(const SO3& R_link_imu, bool only_calm) const;
   void examine_upright();
   void blame_imu_for_all();
   // lidar_examination.cpp
@@ -60,6 +63,8 @@ class Examination {
   // leg_examination.cpp
   void examine_legs();
   bool examine_leg_names();
+  /// Legs that hardly turn show how they bend, not how they are mounted.
+  bool legs_turned() const;
   struct LegScore {
     double explained = 0, flatness = 0;  // share; degrees
     double offset = 0;
@@ -69,7 +74,11 @@ class Examination {
   LegScore score_legs(const LegHypothesis* hypothesis, double offset, bool any_mount) const;
   std::vector<LegPose> legs_under(const LegHypothesis* hypothesis) const;
   bool try_leg_hypotheses();
+  MountFit measure_leg_mount() const;
   void examine_leg_rotation();
+  void examine_leg_clock(const MountFit& fit, double method, double tolerance);
+  bool turns_with_link(const LegHypothesis& other) const;
+  void refine_zeros(const StanceFit& stances);
   void settle_imu_link(const SO3& measured);
   struct LegWay {
     double scale = 1, sigma = 0;  // way by the legs through way by the LiDAR
@@ -111,6 +120,7 @@ class Examination {
   std::optional<LegHypothesis> leg_mend_;
   double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock
   std::optional<TranslationFit> translation_;
+  std::optional<StanceFit> stances_;
   Diagnosis diagnosis_;
   std::vector<Refinement> refinements_;
 };
@@ -120,6 +130,7 @@ std::string vector_text(const Eigen::Vector3d& p);
 std::string number_text(double x);
 /// "5.0 degrees about y": the axis is named when the rotation is about one.
 std::string turn_text(const SO3& turn);
+inline constexpr double most_tilt = 50;  // degrees: a robot that walks is upright
 inline double degrees(double radians) { return radians * 57.29577951308232; }
 
 }  // namespace kilvo::lab

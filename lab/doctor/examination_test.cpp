@@ -1,9 +1,11 @@
 // Wrong descriptions of a simulated robot: the culprit is named, and nobody else is.
 #include "lab/doctor/examination.hpp"
 
+#include <functional>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "lab/doctor/description_watch.hpp"
 #include "lab/settings/settings.hpp"
 #include "lab/simulation/description.hpp"
 #include "lab/simulation/simulator.hpp"
@@ -18,6 +20,7 @@ using testing::IsEmpty;
 struct Walked {
   Recorded recorded;
   Robot robot;
+  std::vector<Measurement> measurements;
 };
 
 const Walked& walked() {
@@ -30,14 +33,18 @@ const Walked& walked() {
       if (scenario.name != "room") continue;
       Simulator simulator(scenario, config);
       Recorder recorder;
-      while (const auto measurement = simulator.next()) recorder.push(*measurement);
-      Walked out{recorder.finish(), {}};
+      Walked out;
+      while (auto measurement = simulator.next()) {
+        recorder.push(*measurement);
+        out.measurements.push_back(*std::move(measurement));
+      }
+      out.recorded = recorder.finish();
       const std::string urdf = std::string(KILVO_SOURCE_DIR) + "/config/robots/sim.urdf";
       out.robot = parse_settings(simulated_config(config, urdf), "simulated", ".").robot;
       out.robot.urdf = urdf_of(config.shape);
       return out;
     }
-    return Walked{};
+    return Walked{{}, {}, {}};
   }();
   return walk;
 }
@@ -104,6 +111,68 @@ TEST(Doctor, LegsAreNamedWithTheJoint) {
   EXPECT_THAT(causes(walked().recorded, robot), ElementsAre("feet_swapped"));
 }
 
+TEST(Doctor, PointsThatAreMirroredAreNoTurnedMount) {
+  Recorded recorded = walked().recorded;
+  for (Sweep& sweep : recorded.sweeps) {
+    for (TimedPoint& point : sweep.points) point.p.z() *= -1;
+  }
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("lidar_axes"));
+}
+
+TEST(Doctor, AnAccelerometerWithoutGravityIsNamed) {
+  Recorded recorded = walked().recorded;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const InertialSample& s : recorded.imu) mean += s.accel / static_cast<double>(recorded.imu.size());
+  for (InertialSample& s : recorded.imu) s.accel -= mean;
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("accel_gravity"));
+}
+
+TEST(Doctor, AJointOfAnotherZeroIsNamed) {
+  Recorded recorded = walked().recorded;
+  const auto hip = static_cast<std::size_t>(std::ranges::find(recorded.joint_names, "left_hip_pitch_joint") - recorded.joint_names.begin());
+  ASSERT_LT(hip, recorded.joint_names.size());
+  for (LegSample& s : recorded.legs) s.position[hip] += 1.5707963;
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("joint_offset"));
+}
+
+std::vector<WrongDescription> watched(const Robot& robot, bool leg_clock_is_found, DescriptionWatch::Judging judging,
+                                      const std::function<void(Measurement&)>& change) {
+  DescriptionWatch watch(robot, leg_clock_is_found, judging);
+  for (Measurement measurement : walked().measurements) {
+    change(measurement);
+    watch.take(measurement);
+  }
+  return watch.finish();
+}
+
+TEST(DescriptionWatch, SaysWhatIsWrongWithinTenSecondsOfData) {
+  const auto in_degrees = [](Measurement& m) {
+    if (auto* imu = std::get_if<ImuSample>(&m)) imu->gyro *= 57.29577951308232;
+  };
+  for (const auto judging : {DescriptionWatch::Judging::here, DescriptionWatch::Judging::beside}) {
+    const auto wrong = watched(walked().robot, false, judging, in_degrees);
+    ASSERT_EQ(wrong.size(), 1U);
+    EXPECT_EQ(wrong.front().finding.cause, "gyro_unit");
+    EXPECT_TRUE(wrong.front().spoils);
+    EXPECT_LT(wrong.front().after, 10);
+  }
+}
+
+TEST(DescriptionWatch, SaysNothingOfARightDescription) {
+  EXPECT_TRUE(watched(walked().robot, false, DescriptionWatch::Judging::here, [](Measurement&) {}).empty());
+}
+
+// legs.clock: estimated: the stamps jump once the clock is found, and again when it was the wrong one.
+TEST(DescriptionWatch, DoesNotAccuseAClockThatTheProgramFinds) {
+  const auto jumps = [](Measurement& m) {
+    auto* legs = std::get_if<JointSample>(&m);
+    if (legs == nullptr) return;
+    const double t = to_seconds(legs->t - stamp_of(walked().measurements.front()));
+    legs->t += from_seconds(t < 4 ? -0.4 : t < 6 ? 0.35 : 0.1);
+  };
+  EXPECT_TRUE(watched(walked().robot, true, DescriptionWatch::Judging::here, jumps).empty());
+}
+
 TEST(Doctor, WhoStandsStillIsNotJudged) {
   Recorded recorded = walked().recorded;
   std::erase_if(recorded.imu, [](const InertialSample& s) { return s.t > 3; });
@@ -112,6 +181,7 @@ TEST(Doctor, WhoStandsStillIsNotJudged) {
   Robot robot = walked().robot;
   robot.lidar.T_imu_lidar.R = robot.lidar.T_imu_lidar.R * turned({0, 0, 90});
   EXPECT_THAT(causes(recorded, robot), IsEmpty());
+  EXPECT_TRUE(Examination(recorded, robot).run().unknown());
 }
 
 }  // namespace

@@ -32,12 +32,14 @@ struct Check {
   Sensor sensor = Sensor::imu;
   std::string what;  // "rotation of the LiDAR's mount"
   Verdict verdict = Verdict::unknown;
-  std::string detail;  // measured value with its standard deviation, or why it cannot be judged
+  std::string detail;    // measured value with its standard deviation, or why it cannot be judged
+  bool at_rest = false;  // tells nothing of mounts and clocks
 };
 
 struct Diagnosis {
   std::vector<Finding> findings;
   std::vector<Check> checks;
+  bool settled = false;  // each sense that is there moved enough to be judged
   bool good() const { return findings.empty(); }
   /// Nothing could be judged at all.
   bool unknown() const;

@@ -34,6 +34,7 @@ void Examination::examine_rates() {
     const std::string measured = fmt::format("{:.1f} Hz, described as {:.1f} Hz", rate, nominal[i]);
     if (std::abs(rate / nominal[i] - 1) < rate_tolerance) {
       check(sensor, "rate", Check::Verdict::good, measured);
+      diagnosis_.checks.back().at_rest = true;
       continue;
     }
     const std::string key = std::string(name_of(sensor)) + ".rate", value = fmt::format("{:.0f}", rate);
@@ -54,6 +55,26 @@ void Examination::examine_acceleration_unit() {
   const std::string evidence = fmt::format("median norm of the acceleration: {:.3f}", norm);
   if (norm > 6.5 && norm < 14) {
     check(Sensor::imu, "unit of the acceleration", Check::Verdict::good, evidence + " m/s^2");
+    diagnosis_.checks.back().at_rest = true;
+    return;
+  }
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double mean_norm = 0;
+  for (const InertialSample& s : recorded_.imu) {
+    mean += s.accel / static_cast<double>(recorded_.imu.size());
+    mean_norm += s.accel.norm() / static_cast<double>(recorded_.imu.size());
+  }
+  // A robot that walks stays upright: what is left of gravity has one direction. What has none is motion alone.
+  if (mean.norm() < 0.3 * mean_norm) {
+    find({Sensor::imu,
+          "accel_gravity",
+          "gravity has been taken out of the acceleration",
+          fmt::format("{}; the mean vector is {:.3f}", evidence, mean.norm()),
+          "the driver must publish what the accelerometer measures, gravity included",
+          norm,
+          "",
+          {},
+          true});
     return;
   }
   if (norm > 0.7 && norm < 1.4) {
@@ -193,45 +214,12 @@ void Examination::settle_axes() {
   }
   const bool proper = G.determinant() > 0 && A.isApprox(G, 1e-9);
   const bool legs_disagree_too = legs_.known && nearest_permutation(legs_.error).transpose().isApprox(G, 1e-9);
-  if (proper && !legs_disagree_too) return;  // the LiDAR's mount: examined next
+  // Points that are mirrored by M turn by -M and move by M: one fault of the LiDAR, two of the IMU.
+  const bool mirrored = G.determinant() > 0 && A.isApprox(-G, 1e-9);
+  if ((proper || mirrored) && !legs_disagree_too) return;  // the LiDAR's mount: examined next
   accuse_imu_axes(G, A, evidence);
   lidar_ = agreement(lidar_turns_, robot_.lidar.T_imu_lidar.R, 0.8);
   if (!leg_turns_.empty()) legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), 0.5);
-}
-
-// Without a LiDAR the accelerometer has only the robot's uprightness to be held against.
-void Examination::examine_upright() {
-  if (recorded_.legs.empty() || robot_.legs.type != "joints" || lidar_.known) return;
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();
-  for (const InertialSample& s : recorded_.imu) force += accel_axes_ * s.accel / static_cast<double>(recorded_.imu.size());
-  // Impacts that are sampled without a filter do not average to gravity.
-  if (std::abs(force.norm() / gravity - 1) > 0.1) return;
-  const Eigen::Vector3d up_link = robot_.imu.T_link_imu.R * force.normalized();
-  // Up by the legs: from the feet to the hips.
-  Eigen::Vector3d up = Eigen::Vector3d::Zero();
-  for (const LegPose& pose : legs_under(leg_mend_ ? &*leg_mend_ : nullptr)) {
-    for (const FootPose& foot : pose.foot) up -= foot.p[0];
-  }
-  if (!(up.norm() > 0)) return;
-  const double angle = degrees(std::acos(std::clamp(up_link.dot(up.normalized()), -1.0, 1.0)));
-  const std::string detail = fmt::format("gravity by the accelerometer is {:.0f} degrees from where the feet are", angle);
-  constexpr double most = 50;  // degrees
-  if (angle < most) {
-    check(Sensor::imu, "uprightness", Check::Verdict::good, detail);
-    return;
-  }
-  const bool turned =
-      std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "imu_mount_rotation" || f.cause == "imu_axes"; });
-  if (turned) return;
-  find({Sensor::imu,
-        legs_.known && legs_.agrees ? "imu_axes" : "imu_mount_rotation",
-        legs_.known && legs_.agrees ? "the accelerometer's axes are not those of the gyro" : "the IMU is not mounted as described",
-        detail,
-        "imu.T_link_imu.R, or the axes in the driver",
-        angle,
-        "deg",
-        {},
-        true});
 }
 
 // Where every other sense is turned, or early, by the same, it is the IMU that is.

@@ -36,6 +36,7 @@ void Examination::settle_imu_link(const SO3& measured) {
     if (name == robot_.imu.link) continue;
     LegHypothesis h;
     h.robot = [&name](Robot& r) { r.imu.link = name; };
+    if (turns_with_link(h)) continue;
     const std::vector<Turn> turns = leg_turns(legs_under(&h), interval);
     if (turns.size() < 30) continue;
     const double explained = explained_by(turns, path, leg_offset_, described.inverse().matrix());

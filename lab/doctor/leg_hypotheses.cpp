@@ -26,27 +26,6 @@ std::string other_side(const std::string& name) {
 
 bool has_side(const std::string& name) { return other_side(name) != name; }
 
-// The joints that move a foot when they turn.
-std::vector<std::size_t> joints_that_matter(const Recorded& recorded, const Robot& robot) {
-  std::vector<std::size_t> out;
-  if (recorded.legs.empty()) return out;
-  Recorded one;
-  one.joint_names = recorded.joint_names;
-  one.legs = {recorded.legs[recorded.legs.size() / 2]};
-  const auto before = leg_path(one, robot, nullptr, 0, nullptr);
-  if (before.empty()) return out;
-  for (std::size_t i = 0; i < recorded.joint_names.size(); ++i) {
-    Recorded moved = one;
-    moved.legs[0].position[i] += 0.3;
-    const auto after = leg_path(moved, robot, nullptr, 0, nullptr);
-    if (after.empty()) continue;
-    double change = 0;
-    for (std::size_t f = 0; f < 2; ++f) change += (after[0].foot[f].R_IF.matrix() - before[0].foot[f].R_IF.matrix()).norm();
-    if (change > 1e-6) out.push_back(i);
-  }
-  return out;
-}
-
 LegHypothesis shifted(const std::vector<std::size_t>& joints, int by) {
   LegHypothesis h;
   h.cause = "joint_names_shifted";
@@ -88,6 +67,64 @@ std::vector<LegHypothesis> exchanges(const std::vector<std::size_t>& joints, con
 }
 
 }  // namespace
+
+std::vector<std::size_t> joints_that_matter(const Recorded& recorded, const Robot& robot) {
+  std::vector<std::size_t> out;
+  if (recorded.legs.empty()) return out;
+  Recorded one;
+  one.joint_names = recorded.joint_names;
+  one.legs = {recorded.legs[recorded.legs.size() / 2]};
+  const auto before = leg_path(one, robot, nullptr, 0, nullptr);
+  if (before.empty()) return out;
+  for (std::size_t i = 0; i < recorded.joint_names.size(); ++i) {
+    Recorded moved = one;
+    moved.legs[0].position[i] += 0.3;
+    const auto after = leg_path(moved, robot, nullptr, 0, nullptr);
+    if (after.empty()) continue;
+    double change = 0;
+    for (std::size_t f = 0; f < 2; ++f) change += (after[0].foot[f].R_IF.matrix() - before[0].foot[f].R_IF.matrix()).norm();
+    if (change > 1e-6) out.push_back(i);
+  }
+  return out;
+}
+
+std::vector<LegHypothesis> gross_leg_hypotheses(const Recorded& recorded, const Robot& robot) {
+  std::vector<LegHypothesis> out;
+  const std::vector<std::size_t> joints = joints_that_matter(recorded, robot);
+  const auto& names = recorded.joint_names;
+  LegHypothesis all;
+  all.cause = "joint_sign";
+  all.name = "all joints of the legs turn the other way round";
+  all.setting = "the axes of the joints in robot.urdf, or their signs in the driver";
+  all.position = [](std::size_t, double& q) { q = -q; };
+  out.push_back(all);
+  for (std::size_t k = 0; k < joints.size(); ++k) {
+    const std::size_t i = joints[k];
+    for (const double turn : {90.0, -90.0, 180.0}) {
+      LegHypothesis h;
+      h.cause = "joint_offset";
+      h.name = fmt::format("the zero of joint {} is off by {:.0f} degrees", names[i], turn);
+      h.setting = fmt::format("the zero of joint {} in the driver, or its origin in robot.urdf", names[i]);
+      h.position = [i, turn](std::size_t j, double& q) {
+        if (j == i) q -= turn / 57.29577951308232;
+      };
+      out.push_back(h);
+    }
+    for (std::size_t l = k + 1; l < joints.size(); ++l) {
+      const std::string a = names[i], b = names[joints[l]];
+      if (a.substr(0, 2) != b.substr(0, 2)) continue;  // of one leg, as its name begins
+      LegHypothesis h;
+      h.cause = "joints_exchanged";
+      h.name = fmt::format("the joints {} and {} are exchanged in the messages", a, b);
+      h.setting = "the driver must publish each position under its own joint's name";
+      h.names = [a, b](std::vector<std::string>& every) {
+        for (std::string& name : every) name = name == a ? b : name == b ? a : name;
+      };
+      out.push_back(h);
+    }
+  }
+  return out;
+}
 
 LegHypothesis degrees_hypothesis() {
   LegHypothesis h;

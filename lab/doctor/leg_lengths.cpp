@@ -216,6 +216,11 @@ void Examination::accuse_leg_lengths(double scale, double height) {
                        scale > 1 ? "long" : "short", 100 * std::abs(scale - 1), scale > 1 ? "farther" : "less far", 100 * std::abs(height),
                        height > 0 ? "higher" : "lower");
   f.remedy = "robot.urdf: the lengths of thigh and shin, or the URDF of this robot";
+  if (scale < 0.4 || scale > 2.5) {
+    f.cause = "urdf";
+    f.text = fmt::format("the legs of the URDF are not those of this robot: by them it walks {:.2f} times as far as by the LiDAR", scale);
+    f.remedy = "robot.urdf, or names, signs and zeros of the joints in the messages";
+  }
   find(std::move(f));
 }
 

@@ -9,11 +9,11 @@ namespace kilvo::lab {
 namespace {
 
 // A careful mount reaches a tenth of this.
-constexpr double rotation_tolerance = 0.7;   // degrees
-constexpr double worth_a_note = 0.08;        // degrees
-constexpr double clock_tolerance = 0.0035;   // s
-constexpr double position_tolerance = 0.05;  // m
-constexpr double sure = 4;                   // standard deviations
+constexpr double rotation_tolerance = 0.7;  // degrees
+constexpr double worth_a_note = 0.08;       // degrees
+constexpr double clock_tolerance = 0.0035;  // s
+constexpr double sure = 4;                  // standard deviations
+constexpr double very_sure = 7;             // of a gyro whose own axes may be half a degree off
 
 double mean_thickness(const std::vector<SweepPose>& way) {
   double sum = 0, n = 0;
@@ -35,9 +35,31 @@ std::vector<Turn> turns_of(const std::vector<SweepPose>& way) {
   return out;
 }
 
+// The same way as seen by a LiDAR whose points are mirrored.
+std::vector<SweepPose> mirrored(std::vector<SweepPose> way, const Eigen::Matrix3d& M) {
+  for (SweepPose& pose : way) {
+    pose.T_WL = {SO3::nearest(M * pose.T_WL.R.matrix() * M), M * pose.T_WL.p};
+    pose.v_W = M * pose.v_W;
+  }
+  return way;
+}
+
 }  // namespace
 
 void Examination::examine_lidar() {
+  const std::size_t clouds = recorded_.stamps[static_cast<std::size_t>(Sensor::lidar)].count;
+  if (clouds >= 30 && recorded_.sweeps.size() < clouds / 10) {
+    find({Sensor::lidar,
+          "lidar_unit",
+          "hardly a point of the clouds is between 0.5 and 200 m: they are not in metres",
+          fmt::format("{} of {} clouds have such points", recorded_.sweeps.size(), clouds),
+          "the driver must publish metres",
+          0,
+          "",
+          {},
+          true});
+    return;
+  }
   if (recorded_.sweeps.size() < 30) return;
   if (!lidar_.known) {
     check(Sensor::lidar, "mount and clock", Check::Verdict::unknown,
@@ -50,6 +72,7 @@ void Examination::examine_lidar() {
   examine_lidar_rotation();
   // Without times a sweep is taken at its stamp: that half a sweep is missing is no fault of the clock.
   if (diagnosis_.findings.size() > before && diagnosis_.findings[before].cause == "point_times_absent") return;
+  if (way_.empty()) return;
   examine_lidar_clock();
   examine_lidar_position();
 }
@@ -141,7 +164,7 @@ void Examination::examine_lidar_rotation() {
   const Eigen::Vector3d sigma = fit.rotation_sigma();
   const double uncertain = degrees(sigma.norm());
   const std::string detail = fmt::format("{:.2f} degrees from the description, standard deviation {:.2f}", angle, uncertain);
-  if (angle < std::max(rotation_tolerance, sure * uncertain)) {
+  if (angle < std::max(rotation_tolerance, very_sure * uncertain)) {
     const bool note = angle > worth_a_note && angle > 3 * uncertain;
     check(Sensor::lidar, "rotation of the mount",
           uncertain > 5 ? Check::Verdict::unknown
@@ -151,12 +174,34 @@ void Examination::examine_lidar_rotation() {
     if (angle < rotation_tolerance) return;  // else: not sure, but the likeliest
     return;
   }
+  // Points that are mirrored turn as those of a LiDAR that is turned by half a turn do; their way differs.
+  const Eigen::Matrix3d M = -(described.inverse() * fit.R).matrix();
+  if (angle > 170 && (M * M).isApprox(Eigen::Matrix3d::Identity(), 0.1)) {
+    const auto proper = TranslationRows(way_, recorded_.imu, gyro(), fit.R, lidar_offset_).fit(accel_axes_);
+    const auto other = TranslationRows(mirrored(way_, M), recorded_.imu, gyro(), described, lidar_offset_).fit(accel_axes_);
+    if (proper && other && other->rms < 0.6 * proper->rms) {
+      find({Sensor::lidar,
+            "lidar_axes",
+            fmt::format("the LiDAR's points are mirrored (left-handed): {} would be right", axes_text(nearest_permutation(M))),
+            fmt::format("way of the sweeps against the acceleration: {:.2f} m/s left then, {:.2f} m/s turned instead", other->rms,
+                        proper->rms),
+            "the driver must publish points in a right-handed frame",
+            0,
+            "",
+            {},
+            true});
+      way_.clear();
+      return;
+    }
+  }
   Finding f;
   f.sensor = Sensor::lidar;
   f.cause = "lidar_rotation";
   f.turn = turn;
   const SE3 inverse = robot_.lidar.T_imu_lidar.inverse();
-  const bool inverted = degrees((fit.R * inverse.R.inverse()).Log().norm()) < std::max(0.15 * angle, 3 * uncertain);
+  // A mount that hardly turns is nearly its own inverse: the two must differ by what is wrong.
+  const bool inverted = degrees((inverse.R * described.inverse()).Log().norm()) > 0.7 * angle &&
+                        degrees((fit.R * inverse.R.inverse()).Log().norm()) < std::min(0.3 * angle, std::max(0.15 * angle, 3 * uncertain));
   if (inverted) {
     f.text = fmt::format("the LiDAR's mount is given the wrong way round (lidar from IMU): {} off", turn_text(SO3::Exp(turn)));
     f.cause = "lidar_inverted";
@@ -186,58 +231,25 @@ void Examination::examine_lidar_clock() {
     check(Sensor::lidar, "clock", note ? Check::Verdict::note : Check::Verdict::good, detail + (note ? ": could be calibrated" : ""));
     return;
   }
+  // Times of too small a unit leave the middle of a sweep too early by half of what they leave out.
+  std::vector<double> spans;
+  for (const Sweep& s : recorded_.sweeps) spans.push_back(s.end - s.begin);
+  std::ranges::nth_element(spans, spans.begin() + static_cast<std::ptrdiff_t>(spans.size() / 2));
+  const double span = spans[spans.size() / 2], period = recorded_.stamps[static_cast<std::size_t>(Sensor::lidar)].period;
+  if (span < 0.7 * period && std::abs(fit.offset - 0.5 * (period - span)) < std::max(0.004, sure * sigma)) {
+    find({Sensor::lidar,
+          "point_times_unit",
+          fmt::format("the points' times span {:.2f} ms of sweeps that take {:.0f} ms", 1e3 * span, 1e3 * period),
+          "half of what is missing is what the sweeps turn earlier by: " + detail,
+          "the driver must publish the points' times in the unit of their field",
+          span / period,
+          "",
+          {},
+          true});
+    return;
+  }
   find_offset(Sensor::lidar, fit.offset, sigma, "turning of the sweeps against the gyro's");
   robot_.lidar.time_offset += fit.offset;
-}
-
-void Examination::examine_lidar_position() {
-  const SO3 R_IL = SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix());
-  const TranslationRows rows(way_, recorded_.imu, gyro(), R_IL, lidar_offset_);
-  translation_ = rows.fit(accel_axes_);
-  if (!translation_) {
-    check(Sensor::lidar, "position of the mount", Check::Verdict::unknown, "too few sweeps in a row that know their way");
-    return;
-  }
-  const TranslationFit& fit = *translation_;
-  const Eigen::Vector3d described = robot_.lidar.T_imu_lidar.p, error = fit.r - described;
-  const Eigen::Vector3d sigma(fit.sigma_r(0), fit.sigma_r(1), fit.sigma_r(2));
-  constexpr double method = 0.004, largest = 0.02;  // m
-  Refinement r = refinement(Sensor::lidar, "position of the LiDAR on the IMU", {error.x(), error.y(), error.z()},
-                            {sigma.x(), sigma.y(), sigma.z()}, method, largest, fmt::format("m"));
-  r.changes = {{"lidar.T_imu_lidar.p", vector_text(fit.r)}};
-  refinements_.push_back(std::move(r));
-  bool wrong = false;
-  for (int i = 0; i < 3; ++i) wrong |= std::abs(error[i]) > std::max(position_tolerance, sure * sigma[i]);
-  const std::string detail =
-      fmt::format("measured ({:.3f}, {:.3f}, {:.3f}) m, standard deviations ({:.3f}, {:.3f}, {:.3f}), described ({:.3f}, {:.3f}, {:.3f})",
-                  fit.r.x(), fit.r.y(), fit.r.z(), sigma.x(), sigma.y(), sigma.z(), described.x(), described.y(), described.z());
-  if (!wrong) {
-    check(Sensor::lidar, "position of the mount", sigma.maxCoeff() > 0.05 ? Check::Verdict::unknown : Check::Verdict::good, detail);
-    return;
-  }
-  Finding f{Sensor::lidar, "lidar_position", "", detail, "", error.norm(), "m", {}, true};
-  const Eigen::Vector3d inverse = -(R_IL.inverse() * described);
-  const double tolerance = std::max(0.02, 3 * sigma.norm());
-  Eigen::Vector3d right = described;
-  for (int i = 0; i < 3; ++i) {
-    if (std::abs(error[i]) > std::max(3 * sigma[i], 0.6 * position_tolerance)) right[i] = std::round(1e3 * fit.r[i]) / 1e3;
-  }
-  if (described.norm() > 3) {
-    f.cause = "lidar_unit";
-    f.text = fmt::format("the LiDAR's position of {:.0f} m on the IMU is in millimetres", described.norm());
-    right = 1e-3 * described;
-  } else if ((fit.r - inverse).norm() < tolerance && (fit.r - inverse).norm() < 0.5 * error.norm()) {
-    f.cause = "lidar_inverted";
-    f.text = "the LiDAR's mount is given the wrong way round (the IMU in the LiDAR's frame)";
-    right = inverse;
-  } else {
-    f.text = fmt::format("the LiDAR is {:.0f} cm from where it is described, ({:.2f}, {:.2f}, {:.2f}) m off", 100 * error.norm(), error.x(),
-                         error.y(), error.z());
-  }
-  f.remedy = fmt::format("lidar.T_imu_lidar.p: {}", vector_text(right));
-  f.changes = {{"lidar.T_imu_lidar.p", vector_text(right)}};
-  robot_.lidar.T_imu_lidar.p = right;
-  find(std::move(f));
 }
 
 }  // namespace kilvo::lab

@@ -1,12 +1,14 @@
 #include "lab/doctor/recorded.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace kilvo::lab {
 namespace {
 
 constexpr std::size_t points_of_a_sweep = 6000;
 constexpr double leg_period = 0.0039;  // s
+constexpr double leg_step = 0.03;      // s between two stamps of a clock that the program finds
 constexpr float nearest = 0.5F;        // m: nearer points may be the robot's own arms
 
 }  // namespace
@@ -29,13 +31,15 @@ void Recorder::take(const ImuSample& sample) {
 
 void Recorder::take(const JointSample& sample) {
   const double t = seconds(sample.t);
-  if (t - last_leg_ < leg_period && t >= last_leg_) return;
+  if (t - last_leg_ < leg_period && (t >= last_leg_ || (recorded_.leg_clock_is_found && t > last_leg_ - leg_step))) return;
   if (!std::ranges::all_of(sample.position, [](double q) { return std::isfinite(q); })) return;
   if (recorded_.joint_names.empty()) recorded_.joint_names = sample.names;
   if (sample.names != recorded_.joint_names) {
     recorded_.joint_names_change = true;
     return;
   }
+  // Before a clock is found, or once another one is, the stamps are off by something else: only what follows can be judged.
+  if (recorded_.leg_clock_is_found && std::abs(t - last_leg_ - leg_period) > leg_step) recorded_.legs.clear();
   last_leg_ = t;
   recorded_.legs.push_back({t, sample.position});
 }

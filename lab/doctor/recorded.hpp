@@ -49,11 +49,13 @@ struct Recorded {
   int image_width = 0, image_height = 0;
   std::array<StampStatistics, sensor_count> stamps;
   bool joint_names_change = false;
+  bool leg_clock_is_found = false;  // by the program (legs.clock): the legs' stamps are no part of the description
 };
 
 /// Takes measurements in the order in which they arrive.
 class Recorder {
  public:
+  explicit Recorder(bool leg_clock_is_found = false) { recorded_.leg_clock_is_found = leg_clock_is_found; }
   void push(const Measurement& measurement);
   /// Everything so far, sorted.
   Recorded finish();

@@ -40,9 +40,10 @@ Refinement refinement(Sensor sensor, const std::string& what, std::vector<double
 std::string to_text(const std::vector<Refinement>& refinements) {
   std::string out;
   for (const Refinement& r : refinements) {
-    const std::string done = !r.observable    ? fmt::format("not observable, kept: {}", r.advice)
-                             : !r.significant ? std::string("as described")
-                                              : std::string("changed");
+    const std::string done = !r.observable       ? fmt::format("not observable, kept: {}", r.advice)
+                             : !r.significant    ? std::string("as described")
+                             : r.changes.empty() ? std::string("off: there is no setting for it, the robot itself has to be calibrated")
+                                                 : std::string("changed");
     out += fmt::format("{:<6} {}: {} {}, standard deviation {}: {}\n", name_of(r.sensor), r.what, numbers(r.change), r.unit,
                        numbers(r.sigma), done);
   }

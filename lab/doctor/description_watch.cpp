@@ -1,0 +1,117 @@
+#include "lab/doctor/description_watch.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+
+#include "lab/doctor/examination.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+// s of a window after which it is judged. A robot that stands first and then walks shows most by the first, the rest by the last.
+constexpr std::array<double, 2> dues{9, 14};
+constexpr double least_turned = 0.5;  // rad, below which a window tells nothing of mounts and clocks
+constexpr int most_windows = 2;       // in which the robot moved: what they leave open stays open
+constexpr double backwards = 1;       // s: another recording begins
+
+// What the estimator finds and corrects by itself, or only becomes less accurate by, is a warning.
+bool spoils(const Finding& finding) {
+  constexpr std::array<std::string_view, 16> always{"imu_axes",       "imu_rotated",         "gyro_unit",  "joint_unit",
+                                                    "joints_swapped", "joint_names_shifted", "joint_sign", "point_times_reversed",
+                                                    "lidar_inverted", "lidar_unit",          "imu_link",   "joint_offset",
+                                                    "lidar_axes",     "accel_gravity",       "urdf",       "point_times_unit"};
+  constexpr double lidar_turn = 3, imu_turn = 10, distance = 0.3, time = 0.08;  // degrees, m, s
+  if (std::ranges::find(always, finding.cause) != always.end()) return true;
+  if (finding.cause == "accel_unit") return finding.fatal;
+  if (finding.cause == "lidar_rotation") return finding.size > lidar_turn;
+  if (finding.cause == "imu_mount_rotation") return finding.size > imu_turn;
+  if (finding.cause == "lidar_position") return finding.size > distance;
+  return finding.cause.ends_with("_clock") && std::abs(finding.size) > time;
+}
+
+}  // namespace
+
+void DescriptionWatch::take(const Measurement& measurement) {
+  const Sensor sensor = sensor_of(measurement);
+  if (sensor == Sensor::camera) return;
+  const std::lock_guard lock(mutex_);
+  if (over_) return;
+  const Time t = stamp_of(measurement);
+  if (!begin_ || to_seconds(t - *begin_) < -backwards) begin(t);
+  last_ = last_ ? std::max(*last_, t) : t;
+  if (const auto* imu = std::get_if<ImuSample>(&measurement)) {
+    if (last_imu_) turned_ += imu->gyro.norm() * std::clamp(to_seconds(imu->t - *last_imu_), 0.0, 0.1);
+    last_imu_ = imu->t;
+  }
+  if (to_seconds(t - *begin_) > dues[due_]) {
+    judge(t);
+    if (over_) return;
+  }
+  recorder_.push(measurement);
+}
+
+void DescriptionWatch::begin(Time t) {
+  begin_ = last_ = t;
+  if (!origin_) origin_ = t;
+  recorder_ = Recorder(leg_clock_is_found_);
+  due_ = 0;
+  turned_ = 0;
+  last_imu_.reset();
+}
+
+bool DescriptionWatch::moved() const { return turned_ > least_turned; }
+
+// One judgement at a time: `live` waits for its turn by going on.
+void DescriptionWatch::judge(Time t) {
+  constexpr auto at_once = std::chrono::seconds(0);
+  if (future_.valid() && judging_ == Judging::live && future_.wait_for(at_once) != std::future_status::ready) return;
+  collect();
+  if (over_) return;
+  if (first_ || moved()) {
+    const auto work = [robot = robot_, recorder = recorder_, t]() mutable {
+      const Recorded recorded = recorder.finish();
+      const Diagnosis diagnosis = Examination(recorded, robot).run();
+      return Verdict{diagnosis.findings, diagnosis.settled, t};
+    };
+    future_ = std::async(judging_ == Judging::here ? std::launch::deferred : std::launch::async, work);
+    if (judging_ == Judging::here) collect();
+  }
+  if (++due_ < dues.size()) return;
+  first_ = false;
+  if (moved()) ++windows_;
+  begin(t);
+}
+
+void DescriptionWatch::collect() {
+  if (!future_.valid()) return;
+  const Verdict verdict = future_.get();
+  over_ = verdict.known || windows_ >= most_windows;
+  for (const Finding& finding : verdict.findings) {
+    const auto same = [&finding](const WrongDescription& w) { return w.finding.cause == finding.cause; };
+    if (std::ranges::none_of(found_, same)) found_.push_back({finding, verdict.t, to_seconds(verdict.t - *origin_), spoils(finding)});
+  }
+}
+
+std::vector<WrongDescription> DescriptionWatch::news() {
+  const std::lock_guard lock(mutex_);
+  if (future_.valid() && future_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) collect();
+  std::vector<WrongDescription> out(found_.begin() + static_cast<std::ptrdiff_t>(told_), found_.end());
+  told_ = found_.size();
+  return out;
+}
+
+std::vector<WrongDescription> DescriptionWatch::finish() {
+  const std::lock_guard lock(mutex_);
+  collect();
+  // A recording that ends before is judged by what there is.
+  if (!over_ && last_) {
+    judge(*last_);
+    collect();
+  }
+  over_ = true;
+  return found_;
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,65 @@
+// The first seconds of a run, or of a life on the robot, held against the description, as kilvo doctor does it, while the run goes on.
+#pragma once
+
+#include <future>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "kilvo/sensors/robot.hpp"
+#include "lab/doctor/finding.hpp"
+#include "lab/doctor/recorded.hpp"
+
+namespace kilvo::lab {
+
+struct WrongDescription {
+  Finding finding;
+  Time t{};             // what came until then shows it
+  double after = 0;     // s of data
+  bool spoils = false;  // results with such a description are worthless, and not only worse
+};
+
+class DescriptionWatch {
+ public:
+  /// here: in take(); beside: in a thread of its own, the same findings; live: likewise, and take() never waits for it.
+  enum class Judging : std::uint8_t { here, beside, live };
+
+  /// `leg_clock_is_found`: by the program, which stamps the legs' samples (legs.clock).
+  DescriptionWatch(const Robot& robot, bool leg_clock_is_found, Judging judging)
+      : robot_(robot), judging_(judging), leg_clock_is_found_(leg_clock_is_found), recorder_(leg_clock_is_found) {}
+  /// Each measurement, in the order of arrival; from any thread. Images are not looked at.
+  void take(const Measurement& measurement);
+  /// What has been found since the last call. Does not wait.
+  std::vector<WrongDescription> news();
+  /// Judges what has come, and waits for it: all that was found.
+  std::vector<WrongDescription> finish();
+
+ private:
+  struct Verdict {
+    std::vector<Finding> findings;
+    bool known = false;  // nothing that more data could show was left open
+    Time t{};
+  };
+  void begin(Time t);
+  void judge(Time t);
+  void collect();
+  bool moved() const;
+
+  Robot robot_;
+  Judging judging_;
+  bool leg_clock_is_found_;
+  std::mutex mutex_;
+  Recorder recorder_;
+  std::optional<Time> origin_, begin_, last_;
+  std::size_t due_ = 0;  // index of the next judgement of this window
+  bool over_ = false;    // all is judged
+  bool first_ = true;    // window: judged even when the robot stands, for units and rates
+  int windows_ = 0;      // in which the robot moved
+  double turned_ = 0;    // rad, by the gyro in this window
+  std::optional<Time> last_imu_;
+  std::future<Verdict> future_;
+  std::vector<WrongDescription> found_;
+  std::size_t told_ = 0;  // of them
+};
+
+}  // namespace kilvo::lab

@@ -1,0 +1,108 @@
+// The IMU on the link that the legs carry, and the legs' clock: by their turning, and by the feet that stand.
+#include <cmath>
+#include <fmt/core.h>
+
+#include "lab/doctor/examination.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double rotation_tolerance = 2.5;  // degrees
+// s, with and without a LiDAR: soles that roll shift it by 6 ms, soft ones by more.
+constexpr double clock_tolerance = 0.009, alone_clock_tolerance = 0.025;
+constexpr double sure = 4;  // standard deviations
+
+}  // namespace
+
+// By the turning alone: each interval by the foot that turns as the gyro does. The foot that swings turns as well: no mount that puts the
+// robot on its head.
+MountFit Examination::measure_leg_mount() const {
+  const SO3 described = robot_.imu.T_link_imu.R.inverse();
+  const GyroPath path = gyro();
+  const auto fit_from = [&](const SO3& start) {
+    MountFit fit = fit_mount(leg_turns_, path, start, legs_.offset);
+    const double explained = fit.explained;
+    for (int k = 0; k < 2 && fit.fit.good; ++k) fit = fit_mount(best_half(leg_turns_, path, fit), path, fit.R, fit.offset);
+    fit.explained = explained;
+    fit.fit.good = fit.fit.good && tilt_under(fit.R.inverse(), false).value_or(0) < most_tilt;
+    return fit;
+  };
+  if (legs_.agrees) return fit_from(described);
+  const MountFit fit = fit_from(SO3::nearest(legs_.error * described.matrix()));
+  return fit.fit.good ? fit : fit_from(described);
+}
+
+void Examination::examine_leg_rotation() {
+  const SO3 described = robot_.imu.T_link_imu.R.inverse();
+  MountFit fit = measure_leg_mount();
+  if (!fit.fit.good) {
+    check(Sensor::legs, "mount of the IMU", Check::Verdict::unknown, "too few steps");
+    return;
+  }
+  // What soles that roll and links that bend shift both by shows in what is not explained.
+  const double unexplained = std::max(0.0, 1 - fit.explained);
+  double method = 0.2 + 10 * unexplained, clock_method = 0.001 + 0.04 * unexplained;  // degrees, s
+  const LidarWay way = lidar_way();
+  Robot start = robot_;
+  const double far = degrees((fit.R * described.inverse()).Log().norm());
+  constexpr double near = 15;  // degrees
+  if (far > near) start.imu.T_link_imu.R = fit.R.inverse();
+  StanceFit stances;
+  if (!way.empty()) stances = fit_stances(recorded_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(), fit.offset);
+  if (stances.good) {
+    fit.R = stances.R_link_imu.inverse();
+    fit.offset = stances.offset;
+    for (int i = 0; i < 3; ++i) fit.fit.cov(i, i) = stances.rotation_sigma[i] * stances.rotation_sigma[i];
+    fit.fit.cov(3, 3) = stances.offset_sigma * stances.offset_sigma;
+    constexpr double stance_method = 0.2, stance_clock_method = 0.002;  // degrees, s
+    method = stance_method;
+    clock_method = stance_clock_method;
+  }
+  leg_offset_ = fit.offset;
+  refine_rotation(Sensor::imu, "rotation of the IMU on the robot", described, fit.R, fit.rotation_sigma(), method, "imu.T_link_imu.R");
+  refinements_.back().changes = {{"imu.T_link_imu.R", rotation_text(fit.R.inverse())}};
+  if (!recorded_.leg_clock_is_found) refine_offset(Sensor::legs, fit.offset, fit.offset_sigma(), clock_method);
+  if (stances.good) refine_zeros(stances);
+  const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
+  const double angle = degrees(turn.norm()), uncertain = std::hypot(degrees(fit.rotation_sigma().norm()), method);
+  const std::string detail = fmt::format("{:.1f} degrees from the description, standard deviation {:.1f}; {:.0f} % explained", angle,
+                                         uncertain, 100 * fit.explained);
+  constexpr double alone_tolerance = 12;  // degrees: legs and gyro alone
+  if (angle > std::max(stances.good ? rotation_tolerance : alone_tolerance, sure * uncertain)) {
+    settle_imu_link(fit.R.inverse());
+    if (!diagnosis_.findings.empty() && diagnosis_.findings.back().cause == "imu_mount_rotation") {
+      diagnosis_.findings.back().turn = turn;
+      diagnosis_.findings.back().evidence = "turning of the legs against the gyro's: " + detail;
+    }
+  } else {
+    check(Sensor::imu, "rotation of its mount on the robot", uncertain > 3 ? Check::Verdict::unknown : Check::Verdict::good, detail);
+  }
+  examine_leg_clock(fit, clock_method, stances.good ? clock_tolerance : alone_clock_tolerance);
+}
+
+void Examination::examine_leg_clock(const MountFit& fit, double method, double tolerance) {
+  const double sigma = std::hypot(fit.offset_sigma(), method);
+  const std::string clock = fmt::format("{:.1f} ms against the IMU, standard deviation {:.1f} ms", 1e3 * fit.offset, 1e3 * sigma);
+  if (recorded_.leg_clock_is_found) {
+    check(Sensor::legs, "clock", Check::Verdict::note, clock + "; found by the program (legs.clock)");
+  } else if (std::abs(fit.offset) < std::max(tolerance, sure * sigma) || fit.explained < 0.6) {
+    check(Sensor::legs, "clock", fit.explained < 0.6 ? Check::Verdict::unknown : Check::Verdict::good, clock);
+    leg_offset_ = 0;
+  } else {
+    find_offset(Sensor::legs, fit.offset, sigma, "the legs against the gyro");
+  }
+}
+
+// A zero that is wrong in both legs alike is a turn of the IMU, and counted as one: its standard deviation says so.
+void Examination::refine_zeros(const StanceFit& stances) {
+  stances_ = stances;
+  constexpr double method = 0.25, largest = 0.5, scale_method = 0.002, largest_scale = 0.005;  // degrees, -
+  for (std::size_t i = 0; i < stances.joints.size(); ++i) {
+    refinements_.push_back(refinement(Sensor::legs, "zero of " + stances.joints[i], {degrees(stances.zero[i])},
+                                      {degrees(stances.zero_sigma[i])}, method, largest, fmt::format("deg")));
+  }
+  refinements_.push_back(refinement(Sensor::legs, fmt::format("scale of the legs"), {stances.scale - 1}, {stances.scale_sigma},
+                                    scale_method, largest_scale, fmt::format("-")));
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,70 @@
+// Where the LiDAR sits on the IMU, by its way and the acceleration.
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+
+#include "lab/doctor/examination.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double position_tolerance = 0.05;  // m
+constexpr double sure = 4;                   // standard deviations
+
+}  // namespace
+
+void Examination::examine_lidar_position() {
+  if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "accel_gravity"; })) {
+    check(Sensor::lidar, "position of the mount", Check::Verdict::unknown, "the acceleration is not what was measured");
+    return;
+  }
+  const SO3 R_IL = SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix());
+  const TranslationRows rows(way_, recorded_.imu, gyro(), R_IL, lidar_offset_);
+  translation_ = rows.fit(accel_axes_);
+  if (!translation_) {
+    check(Sensor::lidar, "position of the mount", Check::Verdict::unknown, "too few sweeps in a row that know their way");
+    return;
+  }
+  const TranslationFit& fit = *translation_;
+  const Eigen::Vector3d described = robot_.lidar.T_imu_lidar.p, error = fit.r - described;
+  const Eigen::Vector3d sigma(fit.sigma_r(0), fit.sigma_r(1), fit.sigma_r(2));
+  constexpr double method = 0.004, largest = 0.02;  // m
+  Refinement r = refinement(Sensor::lidar, "position of the LiDAR on the IMU", {error.x(), error.y(), error.z()},
+                            {sigma.x(), sigma.y(), sigma.z()}, method, largest, fmt::format("m"));
+  r.changes = {{"lidar.T_imu_lidar.p", vector_text(fit.r)}};
+  refinements_.push_back(std::move(r));
+  bool wrong = false;
+  for (int i = 0; i < 3; ++i) wrong |= std::abs(error[i]) > std::max(position_tolerance, sure * sigma[i]);
+  const std::string detail =
+      fmt::format("measured ({:.3f}, {:.3f}, {:.3f}) m, standard deviations ({:.3f}, {:.3f}, {:.3f}), described ({:.3f}, {:.3f}, {:.3f})",
+                  fit.r.x(), fit.r.y(), fit.r.z(), sigma.x(), sigma.y(), sigma.z(), described.x(), described.y(), described.z());
+  if (!wrong) {
+    check(Sensor::lidar, "position of the mount", sigma.maxCoeff() > 0.05 ? Check::Verdict::unknown : Check::Verdict::good, detail);
+    return;
+  }
+  Finding f{Sensor::lidar, "lidar_position", "", detail, "", error.norm(), "m", {}, true};
+  const Eigen::Vector3d inverse = -(R_IL.inverse() * described);
+  const double tolerance = std::max(0.02, 3 * sigma.norm());
+  Eigen::Vector3d right = described;
+  for (int i = 0; i < 3; ++i) {
+    if (std::abs(error[i]) > std::max(3 * sigma[i], 0.6 * position_tolerance)) right[i] = std::round(1e3 * fit.r[i]) / 1e3;
+  }
+  if (described.norm() > 3) {
+    f.cause = "lidar_unit";
+    f.text = fmt::format("the LiDAR's position of {:.0f} m on the IMU is in millimetres", described.norm());
+    right = 1e-3 * described;
+  } else if ((fit.r - inverse).norm() < tolerance && (fit.r - inverse).norm() < 0.5 * error.norm()) {
+    f.cause = "lidar_inverted";
+    f.text = "the LiDAR's mount is given the wrong way round (the IMU in the LiDAR's frame)";
+    right = inverse;
+  } else {
+    f.text = fmt::format("the LiDAR is {:.0f} cm from where it is described, ({:.2f}, {:.2f}, {:.2f}) m off", 100 * error.norm(), error.x(),
+                         error.y(), error.z());
+  }
+  f.remedy = fmt::format("lidar.T_imu_lidar.p: {}", vector_text(right));
+  f.changes = {{"lidar.T_imu_lidar.p", vector_text(right)}};
+  robot_.lidar.T_imu_lidar.p = right;
+  find(std::move(f));
+}
+
+}  // namespace kilvo::lab
