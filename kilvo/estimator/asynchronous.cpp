@@ -36,7 +36,7 @@ void Estimator::process(ImuSample s, std::vector<Output>& out) {
   if (frames_.has_one_until(s.t)) {
     history_.drop_leg_updates_ahead();
     process_frames(s.t, out);
-    history_.resume(Estimate(history_.now()));
+    history_.resume(history_.now());
   }
   history_.close(s.t);
   if (!status_.has_legs()) history_.take_closing_us();

@@ -69,6 +69,11 @@ Findings Findings::next_epoch() {
   next.statistics_ = std::move(statistics_);
   next.events_ = std::move(events_);
   next.drops_ = drops_;
+  // What was before is not judged again.
+  for (std::size_t s = 0; s < sensor_count; ++s) next.used_before_.used[s] = next.statistics_.sensors[s].used;
+  next.used_before_.dropped = next.drops_;
+  next.used_before_.unsupported = next.statistics_.unsupported;
+  next.lost_stances_before_ = next.statistics_.lost_stances;
   ++next.statistics_.epochs;
   return next;
 }

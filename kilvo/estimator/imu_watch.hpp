@@ -18,7 +18,6 @@ class ImuWatch {
 
   /// Accelerations are `scale` times what the samples say, in m/s^2.
   void set_scale(double scale) { accel_scale_ = scale; }
-  double scale() const { return accel_scale_; }
 
   /// Brings a sample to m/s^2 and marks what is clipped. Says why it is not to be used.
   std::optional<Reason> prepare(ImuSample& s);
@@ -33,8 +32,6 @@ class ImuWatch {
   /// With no other sensor: the estimate, if the robot looks like one at rest at `s` and this has not been said just now. It does not move,
   /// and up is where the accelerometer says.
   std::optional<Estimate> zero_velocity_update(const Estimate& e, const ImuSample& s, const UpdateConfig& config);
-
-  const ClippingDetector& clipping() const { return clipping_; }
 
  private:
   double accel_scale_ = 1;

@@ -1,8 +1,5 @@
 #include "kilvo/estimator/live_propagator.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include "kilvo/estimator/silence.hpp"
 #include "kilvo/filter/gap.hpp"
 #include "kilvo/input/fault.hpp"

@@ -42,7 +42,6 @@ class SensorStatus {
   /// Legs that come again in the middle of an impact would start with wrong contacts (paper, Section IV-E), and which foot stands is told
   /// by what is still, for which the velocity must be known: whether those of `t` may be used, or have waited for long enough.
   bool may_legs_return(Time t, bool is_calm, bool is_velocity_known, const Health& health);
-  double leg_period() const { return leg_period_; }
 
   /// From now on there is no pose, or there is one again.
   void lose_imu(const Health& health);

@@ -20,8 +20,6 @@ class StationarityDetector {
   void restart();
   /// The IMU has looked like one of a standing robot for at least half a second.
   bool stands() const { return quiet_blocks_ >= 2; }
-  /// The mean rate while it stood, rad/s.
-  const Eigen::Vector3d& resting_gyro() const { return resting_gyro_; }
   /// The acceleration has been a usual one for at least `hold`.
   bool is_usual(Time t, Duration hold) const { return usual_since_ && t - *usual_since_ >= hold; }
 

@@ -104,36 +104,38 @@ std::optional<Reason> VisualPipeline::refuses(Time image) const {
 VisualRegistration VisualPipeline::measure(const CameraImage& image, const ImageContext& context) {
   VisualRegistration out;
   out.posterior = context.prior;
+  work_.reset();
   if (is_lost_among_patches(context)) {
     out.refused = Reason::pose_uncertain;
     return out;
   }
-  work_ = std::make_unique<Work>(*this, image, context);
-  adapt_exposure(*work_);
-  work_->posterior = update_by(*work_);
-  const PhotometricModel& model = work_->model;
-  if (!is_plausible(work_->posterior) || !is_definite(work_->posterior.P)) {
-    out.posterior = work_->posterior;
+  auto work = std::make_unique<Work>(*this, image, context);
+  adapt_exposure(*work);
+  work->posterior = update_by(*work);
+  const PhotometricModel& model = work->model;
+  if (!is_plausible(work->posterior) || !is_definite(work->posterior.P)) {
+    out.posterior = work->posterior;
     out.refused = Reason::not_finite;
     return out;
   }
-  if (const auto turned = context.prior.t == image.t ? check_mount(*work_) : std::nullopt) {
+  if (const auto turned = context.prior.t == image.t ? check_mount(*work) : std::nullopt) {
     // Its patches lie where the wrong mount put them.
     forget_map();
     out.turned = *turned;
     out.refused = Reason::mount_doubted;
     return out;
   }
-  if (says_nothing(*work_)) {
+  if (says_nothing(*work)) {
     out.refused = Reason::agrees_with_nothing;
     return out;
   }
-  out.posterior = work_->posterior;
+  out.posterior = work->posterior;
   out.used = model.report().used;
   out.carries = carries_estimate(model.report());
-  out.T_WI = as_the_map_has_it(work_->prior.x, out.posterior.x, context.unobservable);
+  out.T_WI = as_the_map_has_it(work->prior.x, out.posterior.x, context.unobservable);
   const bool blind = !context.unobservable.isZero(0);
-  if (blind && !context.feet_hold && out.used >= enough) out.drift = drift_of(*work_, out.posterior.x.pose());
+  if (blind && !context.feet_hold && out.used >= enough) out.drift = drift_of(*work, out.posterior.x.pose());
+  work_ = std::move(work);
   return out;
 }
 

@@ -48,6 +48,7 @@ class VisualPipeline {
  public:
   VisualPipeline(const CameraMount& mount, const VisionConfig& config, const VisualMapConfig& map, const UpdateConfig& update,
                  double map_radius);
+  /// Not between measure() and learn().
   VisualPipeline(VisualPipeline&&) noexcept;
   VisualPipeline& operator=(VisualPipeline&&) noexcept;
   ~VisualPipeline();
