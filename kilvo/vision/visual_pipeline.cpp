@@ -133,8 +133,7 @@ VisualRegistration VisualPipeline::measure(const CameraImage& image, const Image
   out.used = model.report().used;
   out.carries = carries_estimate(model.report());
   out.T_WI = as_the_map_has_it(work->prior.x, out.posterior.x, context.unobservable);
-  const bool blind = !context.unobservable.isZero(0);
-  if (blind && !context.feet_hold && out.used >= enough) out.drift = drift_of(*work, out.posterior.x.pose());
+  if (!context.unobservable.isZero(0) && !context.feet_hold && out.used >= enough) out.drift = drift_of(*work, out.posterior.x.pose());
   work_ = std::move(work);
   return out;
 }
