@@ -79,7 +79,7 @@ class Estimator {
 
   // The sequential phase.
   void process_frames(Time until, std::vector<Output>& out);
-  void process(const LidarScan& scan, std::vector<Output>& out);
+  void process(const LidarScan& scan, Time begin, Time end, std::vector<Output>& out);
   void process(const CameraImage& image);
   void refuse_sweep(Reason reason, const Estimate& prior, Time end);
 

@@ -89,7 +89,6 @@ void Findings::report_clipping(const Situation& now, const ImuSample& s, std::ui
 }
 
 void Findings::report_clock_steps(const Situation& now, const ClockSteps& steps) {
-  if (steps.count() == statistics_.clock_steps) return;
   statistics_.clock_steps = steps.count();
   const double back = to_seconds(steps.last());
   report(now, Sensor::imu, Reason::imu_clock_stepped, std::abs(back), back > 0 ? "back" : "ahead");

@@ -27,15 +27,14 @@ double least_offset(bool is_shifted) { return is_shifted ? 5e-4 : 2e-3; }
 void Estimator::process_frames(Time until, std::vector<Output>& out) {
   while (auto frame = frames_.pop(until)) {
     if (const auto* scan = std::get_if<LidarScan>(&frame->what)) {
-      process(*scan, out);
+      process(*scan, frame->begin, frame->end, out);
     } else {
       process(std::get<CameraImage>(frame->what));
     }
   }
 }
 
-void Estimator::process(const LidarScan& scan, std::vector<Output>& out) {
-  const Time begin = begin_of(scan), end = end_of(scan);
+void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector<Output>& out) {
   if (end < history_.base().t) return findings_.drop(Sensor::lidar, Reason::before_state);
   if (history_.replay().is_blind(begin, end)) return findings_.drop(Sensor::lidar, Reason::no_imu);
   if (frames_.last_middle()) lidar_.note_silence(begin - status_.last_sweep());
