@@ -17,7 +17,7 @@ struct RunWords {
   RunOptions options;
   std::string out, map, config;
   std::optional<std::string> sensors;
-  std::vector<std::string> drops, delays;
+  std::vector<std::string> drops, degradations, delays;
   std::optional<double> realtime;
   bool no_map = false;
   int threads = 0;  // 0: as many as there are cores
@@ -29,6 +29,7 @@ int run(RunWords words) {
   if (!words.config.empty()) options.config = words.config;
   if (words.sensors) options.sensors = parse_sensors(*words.sensors);
   for (const std::string& text : words.drops) options.failures.push_back(parse_drop(text));
+  for (const std::string& text : words.degradations) options.failures.push_back(parse_degradation(text));
   for (const std::string& text : words.delays) options.failures.push_back(parse_delay(text));
   options.realtime = words.realtime;
   if (options.realtime && !(*options.realtime > 0 && *options.realtime <= 1000))
@@ -66,6 +67,10 @@ void add_run(CLI::App& program, Action& chosen) {
   verb->add_option("--drop", words->drops,
                    "leave out a sensor's messages between two times (lidar:10-16; lidar:10- to the end), repeatable")
       ->type_name("SENSOR:T0-T1")
+      ->allow_extra_args(false);
+  verb->add_option("--degrade", words->degradations,
+                   "worsen what a sensor sees between two times: dark or blank images, scans of a narrow sector (dark:10-16), repeatable")
+      ->type_name("KIND:T0-T1")
       ->allow_extra_args(false);
   verb->add_option("--realtime", words->realtime, "play it through the live runner, so many times as fast as it was recorded (1)")
       ->type_name("[SPEED]");

@@ -5,7 +5,10 @@
 #include <cmath>
 #include <fmt/core.h>
 #include <limits>
+#include <map>
+#include <numbers>
 #include <set>
+#include <string_view>
 
 #include "apps/cli/exit_code.hpp"
 #include "lab/messages/input_error.hpp"
@@ -85,6 +88,19 @@ std::string first_few(const std::set<std::string>& names) {
   return out;
 }
 
+// `failure` from T0 to T1 as "T0-T1", or "T0-" to the end.
+lab::Failure between_times(lab::Failure failure, std::string_view rest, const UsageError& wrong) {
+  const auto from = take_seconds(rest);
+  if (!from || !rest.starts_with('-')) throw wrong;
+  failure.from = *from;
+  rest.remove_prefix(1);
+  if (rest.empty()) return failure;
+  const auto until = take_seconds(rest);
+  if (!until || !rest.empty() || *until < *from) throw wrong;
+  failure.until = *until;
+  return failure;
+}
+
 }  // namespace
 
 std::vector<Sensor> parse_sensors(const std::string& list) {
@@ -112,20 +128,21 @@ lab::Failure parse_drop(const std::string& text) {
   const UsageError wrong(fmt::format("--drop {}: must be SENSOR:T0-T1 in seconds, as in lidar:10-16, or lidar:10- (to the end)", text));
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos) throw wrong;
-  lab::Failure out;
-  out.sensor = parse_sensor(text.substr(0, colon));
-  std::string_view rest = std::string_view(text).substr(colon + 1);
-  const auto from = take_seconds(rest);
-  if (!from || !rest.starts_with('-')) throw wrong;
-  out.from = *from;
-  rest.remove_prefix(1);
-  if (rest.empty()) return out;
-  const auto until = take_seconds(rest);
-  if (!until || !rest.empty() || *until < *from) throw wrong;
-  out.until = *until;
-  return out;
+  return between_times({.sensor = parse_sensor(text.substr(0, colon))}, text.substr(colon + 1), wrong);
 }
 
+lab::Failure parse_degradation(const std::string& text) {
+  const UsageError wrong(fmt::format("--degrade {}: must be KIND:T0-T1, KIND one of dark, blank, narrow, as in dark:10-16", text));
+  // A thirtieth of the light; a sector of 30 degrees.
+  const std::map<std::string, lab::Failure> kinds{
+      {"dark", {.kind = lab::FailureKind::darkness, .sensor = Sensor::camera, .amount = 1.0 / 30}},
+      {"blank", {.kind = lab::FailureKind::textureless, .sensor = Sensor::camera}},
+      {"narrow", {.kind = lab::FailureKind::narrow_sector, .sensor = Sensor::lidar, .amount = std::numbers::pi / 6}}};
+  const std::size_t colon = text.find(':');
+  const auto kind = kinds.find(text.substr(0, colon));
+  if (colon == std::string::npos || kind == kinds.end()) throw wrong;
+  return between_times(kind->second, text.substr(colon + 1), wrong);
+}
 std::string joined(const std::vector<std::string>& inputs) {
   std::string all;
   for (const std::string& input : inputs) all += (all.empty() ? "" : " + ") + input;

@@ -20,6 +20,9 @@ std::vector<Sensor> parse_sensors(const std::string& list);
 /// "lidar:10-16", "lidar:10-" (to the end). Throws UsageError.
 lab::Failure parse_drop(const std::string& text);
 
+/// "dark:10-16", "blank:10-16" (images), "narrow:10-" (scans of 30 degrees). Throws UsageError.
+lab::Failure parse_degradation(const std::string& text);
+
 /// "camera:50": its messages come 50 ms later. Throws UsageError.
 lab::Failure parse_delay(const std::string& text);
 

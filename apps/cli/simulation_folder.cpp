@@ -21,11 +21,12 @@ namespace fs = std::filesystem;
 constexpr double truth_rate = 1000;  // Hz
 constexpr double longest = 3600;     // s
 
-const lab::Scenario& find_scenario(const std::string& name) {
+const lab::Scenario& scenario_called(const std::string& name) {
+  if (const lab::Scenario* found = lab::find_scenario(name)) return *found;
   std::vector<std::string> names;
   for (const lab::Scenario& s : lab::scenarios()) {
-    if (s.name == name) return s;
     names.push_back(s.name);
+    if (!s.also.empty()) names.push_back(s.also);
   }
   throw UsageError(fmt::format("no scenario '{}', nearest is '{}' (kilvo simulate --help lists them)", name, lab::nearest(name, names)));
 }
@@ -97,12 +98,13 @@ void write_recording(const fs::path& folder, lab::Simulator& simulator, Progress
 
 std::string list_of_scenarios() {
   std::string out = "Scenarios:\n";
-  for (const lab::Scenario& s : lab::scenarios()) out += fmt::format("  {:<12} {}\n", s.name, s.sentence);
+  for (const lab::Scenario& s : lab::scenarios())
+    out += fmt::format("  {:<15} {}{}\n", s.name, s.sentence, s.also.empty() ? "" : fmt::format(" (also: {})", s.also));
   return out + "Each begins with 3 s of standing still. The same scenario and seed give the same bytes.";
 }
 
 double simulate_into(const fs::path& folder, const SimulationOptions& options) {
-  const lab::Scenario scenario = stretched(find_scenario(options.scenario), options.stride);
+  const lab::Scenario scenario = stretched(scenario_called(options.scenario), options.stride);
   if (options.duration && !(*options.duration > 0 && *options.duration <= longest)) {
     throw UsageError(fmt::format("--duration must be above 0 and at most {} seconds", longest));
   }

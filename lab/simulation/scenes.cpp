@@ -86,10 +86,12 @@ void make_room(Scene& scene, Random& random, bool blank) {
   furnish(scene, p, random);
 }
 
-// 40 m long; doors and cupboards only near its ends, nothing but parallel planes between x = 10 and x = 26.
-void make_corridor(Scene& scene, Random& random) {
+// 40 m long; doors and cupboards only near its ends, nothing but parallel planes between x = 10 and x = 26. `blank`: its long walls have no
+// texture.
+void make_corridor(Scene& scene, Random& random, bool blank) {
   const Palette p = add_palette(scene);
-  add_shell(scene, {{-3, -1.2, 0}, {37, 1.2, 2.6}, p.floor, p.ceiling, {p.bricks, p.bricks, p.wall, p.wall}});
+  const std::size_t wall = blank ? p.blank : p.wall;
+  add_shell(scene, {{-3, -1.2, 0}, {37, 1.2, 2.6}, p.floor, p.ceiling, {p.bricks, p.bricks, wall, wall}});
   for (const double base : {-2.5, 27.5}) {
     for (int i = 0; i < 4; ++i) {
       const double x = base + 2.4 * i + random.uniform(-0.2, 0.2), depth = random.uniform(0.15, 0.35), height = random.uniform(0.8, 2.2);
@@ -155,8 +157,8 @@ Scene make_scene(const std::string& name, std::uint64_t seed) {
     make_room(scene, random, false);
   else if (name == "blank_wall")
     make_room(scene, random, true);
-  else if (name == "corridor")
-    make_corridor(scene, random);
+  else if (name == "corridor" || name == "corridor_blank")
+    make_corridor(scene, random, name == "corridor_blank");
   else if (name == "yard")
     make_yard(scene, random);
   else if (name == "stairs")

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <numbers>
+#include <set>
 
 #include "lab/simulation/joint_effort.hpp"
 #include "lab/simulation/random.hpp"
@@ -81,7 +82,8 @@ SE3 foot_by_joints(const Walk& walk, Side side, double t) {
 
 TEST_P(EveryWalk, AStandingFootStaysOnItsFootprint) {
   const Walk walk = walk_of(GetParam());
-  const bool slides = GetParam() == "slip" || GetParam() == "soft", rolls = GetParam() == "rolling" || GetParam() == "stairs";
+  const std::set<std::string> sliding{"slip", "soft", "tiles", "robust"};
+  const bool slides = sliding.contains(GetParam()), rolls = GetParam() == "rolling" || GetParam() == "stairs";
   double farthest = 0;  // m
   for (const Side side : {Side::left, Side::right}) {
     for (const Footprint& print : walk.plan().prints[side == Side::left ? 0 : 1]) {
@@ -117,6 +119,47 @@ std::vector<std::string> names() {
   return out;
 }
 INSTANTIATE_TEST_SUITE_P(Scenarios, EveryWalk, ::testing::ValuesIn(names()), [](const auto& each) { return each.param; });
+
+// As other recordings of the same kinds are named.
+TEST(Scenarios, TheKindsOfThePapersSequencesAreThere) {
+  for (const char* name :
+       {"room_short", "fwd_bwd", "walk_back", "square_walk", "walk_in_place", "spin", "run_room", "run", "slope", "corridor",
+        "corridor_blank", "blank_wall", "soft_terrain", "slip", "outdoor", "robust", "tiles", "emergency_stop", "lifts"})
+    EXPECT_NE(find_scenario(name), nullptr) << name;
+  EXPECT_EQ(find_scenario("square_walk"), find_scenario("square"));
+  EXPECT_EQ(find_scenario("moon"), nullptr);
+}
+
+TEST(Walk, AnEmergencyStopEndsARunWithinOneStep) {
+  const Walk walk = walk_of("emergency_stop");
+  const auto& steps = walk.plan().steps;
+  const auto stop = std::ranges::adjacent_find(
+      steps, [](const Step& a, const Step& b) { return a.gait.double_support < 0 && b.gait.double_support > 0; });
+  ASSERT_NE(stop, steps.end());
+  const auto speed = [&](double t) { return walk.velocity(t).head<2>().norm(); };
+  const Step& last = *std::next(stop);
+  EXPECT_GT(speed(stop->begin), 0.9);
+  EXPECT_LT(speed(last.begin + 2 * last.period), 0.05);
+}
+
+TEST(Walk, ALiftedFootIsHeldUpWhileTheOtherStands) {
+  const Walk walk = walk_of("lifts");
+  const Step& step = walk.plan().steps[2];
+  const double middle = step.begin + step.period / 2;
+  EXPECT_FALSE(walk.in_contact(step.side, middle));
+  EXPECT_GT((walk.foot(step.side, middle).p - walk.foot(step.side, step.begin).p).z(), 0.07);
+  EXPECT_LT((walk.imu(middle).p - walk.imu(step.begin).p).head<2>().norm(), 0.08);
+}
+
+TEST(Walk, SlabsGiveWayUnderEachFoot) {
+  const Walk walk = walk_of("tiles");
+  for (const std::size_t side : {0U, 1U}) {
+    const Footprint& print = walk.plan().prints[side][3];
+    const Eigen::Vector3d moved = print.displacement(print.lift - print.touch);
+    EXPECT_LT(moved.z(), -0.004);
+    EXPECT_NEAR(moved.head<2>().norm(), 0.01, 1e-3);
+  }
+}
 
 TEST(Walk, ImpactsRingInTheAccelerometerAndDieAway) {
   const Walk walk = walk_of("in_place");

@@ -96,7 +96,7 @@ class World {
   std::unique_ptr<Rays> rays_;
 };
 
-/// The worlds that there are: room, corridor, blank_wall, yard, stairs. The seed moves furniture and changes textures.
+/// The worlds that there are: room, corridor, corridor_blank, blank_wall, yard, stairs. The seed moves furniture and changes textures.
 Scene make_scene(const std::string& name, std::uint64_t seed);
 
 }  // namespace kilvo::lab

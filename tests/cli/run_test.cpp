@@ -120,6 +120,14 @@ TEST_F(Run, DroppedScansAreCountedAndBridged) {
   EXPECT_LT(errors(walk.truth).ate_max_m, 0.1);
 }
 
+TEST_F(Run, DegradedScansShowLess) {
+  ASSERT_EQ(run().code, 0);
+  const double whole = summary()["points"]["in_map"];
+  ASSERT_EQ(run({"--degrade", "narrow:0.5-"}).code, 0);
+  EXPECT_LT(summary()["points"]["in_map"], 0.7 * whole);
+  EXPECT_EQ(summary()["messages"]["lidar"]["dropped"].count("drop_option"), 0U);
+}
+
 TEST_F(Run, APartOfTheRecordingCanBeChosen) {
   ASSERT_EQ(run({"--start", "0.5", "--duration", "2"}).code, 0);
   const auto odometry = lab::read_tum(folder / "out/odometry.tum");

@@ -42,6 +42,9 @@ TEST(Usage, MissingOrImpossibleWordsAreSaid) {
   for (const char* drop : {"lidar", "lidar:", "lidar:5", "lidar:6-5", "lidar:a-b", "lidar:1-2x", ":1-2", "lidar:nan-2"}) {
     expect_error({"run", "x.bag", "--out", "never_written", "--drop", drop}, 2, "");
   }
+  for (const char* degraded : {"dark", "dark:", "dark:5", "dark:6-5", "bright:1-2", ":1-2", "camera:1-2"}) {
+    expect_error({"run", "x.bag", "--out", "never_written", "--degrade", degraded}, 2, "--degrade");
+  }
   for (const char* delay : {"lidar", "lidar:", "lidar:-5", "lidar:a", "lidar:5ms", "sonar:5", "lidar:1e9"}) {
     expect_error({"run", "x.bag", "--out", "never_written", "--delay", delay}, 2, "");
   }
