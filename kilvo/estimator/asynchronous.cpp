@@ -59,9 +59,8 @@ void Estimator::process(const JointSample& s, std::vector<Output>& out) {
   if (s.t < history_.now().t || !replay.has_imu()) return findings_.drop(Sensor::legs, Reason::before_state);
   if (status_.imu_lost() || to_seconds(s.t - replay.newest_imu().t) > longest_held_imu(robot_.imu.rate))
     return findings_.drop(Sensor::legs, Reason::no_imu);
-  constexpr Duration calm = std::chrono::milliseconds(20);
   const double sigma_v = std::sqrt(std::max(0.0, history_.now().P.block<3, 3>(at::v, at::v).trace() / 3));
-  if (!status_.may_legs_return(s.t, imu_.is_calm(s.t, calm), sigma_v < known_velocity, input_.health()))
+  if (!status_.may_legs_return(s.t, is_settled(s.t), sigma_v < known_velocity, input_.health()))
     return findings_.drop(Sensor::legs, Reason::not_calm);
   auto known = kinematics_->feet(s);
   if (const auto* fault = std::get_if<std::string>(&known)) return findings_.drop(Sensor::legs, Reason::wrong_joints, *fault);

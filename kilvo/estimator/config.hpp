@@ -1,6 +1,7 @@
 // Settings of the estimator and of all that it conducts.
 #pragma once
 
+#include <string>
 #include <tuple>
 
 #include "kilvo/filter/predict.hpp"
@@ -43,6 +44,7 @@ struct EstimatorConfig {
   double smooth_time = 0.5;    // s
   bool wait_for_images = true;
   bool gravity_align = true;
+  std::string settling = "legs";  // legs | all | none
   int threads = 1;
 
   InitialConfig initial;
@@ -63,6 +65,8 @@ struct EstimatorConfig {
         Field{"smooth_time", &EstimatorConfig::smooth_time, "s",
               "the smooth odometry takes about two thirds of a correction in over this time"},
         Field{"gravity_align", &EstimatorConfig::gravity_align, "-", "z of the world is up; false: the world is the first IMU frame"},
+        Field{"settling", &EstimatorConfig::settling, "-",
+              "which sensors that come back wait for a usual acceleration: legs, all (LiDAR and camera too, as in the paper) or none"},
         Field{"threads", &EstimatorConfig::threads, "-", "threads for sums over many points, 0: all cores; results do not depend on it"}};
   }
 };

@@ -13,6 +13,8 @@ namespace kilvo {
 Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::array<bool, sensor_count> used)
     : robot_(robot),
       config_(config),
+      settles_all_(config.settling == "all"),
+      settles_nothing_(config.settling == "none"),
       input_(robot, used, from_seconds(config.max_wait), config.wait_for_images),
       starter_(config),
       imu_(robot.imu, config.initial),
@@ -20,7 +22,7 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       legs_(config.legs),
       lidar_(robot.lidar, config.lidar, config.update, config.noise, config.threads),
       map_(config.map, config.lidar, robot.lidar.T_imu_lidar.p),
-      frames_(robot.lidar.rate, input_.uses(Sensor::lidar)),
+      frames_(robot.lidar.rate, input_.uses(Sensor::lidar), config.lidar.recut && input_.uses(Sensor::camera)),
       status_(robot, input_.uses(Sensor::lidar)) {
   if (!input_.uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.surfaces().leaf_size() * (1 + 1e-9))
@@ -144,6 +146,12 @@ void Estimator::choose_modality(Time t) {
   constexpr double doubt = 0.003;
   if (change == SensorStatus::Change::of_modality && status_.modality() == Modality::coast && frames_.empty())
     history_.inflate_velocity(doubt);
+}
+
+// A sweep or image of a sensor that was lost comes in the middle of an impact: it waits as the legs do, but not for ever.
+bool Estimator::must_settle(Sensor s, Time t) {
+  if (!settles_all_ || !status_.is_missing(s)) return false;
+  return !is_settled(t) && status_.has_waited_less(s, t, std::chrono::seconds(1));
 }
 
 bool Estimator::keep_plausible(bool definite) {

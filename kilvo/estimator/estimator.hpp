@@ -88,12 +88,15 @@ class Estimator {
   void lose_legs(Time t);
   void choose_modality(Time t);
   bool keep_plausible(bool definite = false);  // `definite`: looks at the whole covariance
+  bool is_settled(Time t) const { return settles_nothing_ || imu_.is_calm(t, std::chrono::milliseconds(20)); }
+  bool must_settle(Sensor s, Time t);
   Findings::Situation situation() const;
   void emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0,
             double contact_us = 0);
 
   Robot robot_;
   EstimatorConfig config_;
+  bool settles_all_, settles_nothing_;  // of the settings
   InputQueue input_;
   Starter starter_;
   ImuWatch imu_;

@@ -16,13 +16,21 @@ bool is_scan(const FrameQueue::Frame& f) { return std::holds_alternative<LidarSc
 }  // namespace
 
 std::optional<FrameQueue::Frame> FrameQueue::push(LidarScan scan) {
+  if (!recut_) return insert(std::move(scan));
+  std::optional<Frame> crowded_out;
+  for (LidarScan& part : recutter_.add(scan)) crowded_out = insert(std::move(part));
+  return crowded_out;
+}
+
+std::optional<FrameQueue::Frame> FrameQueue::insert(LidarScan scan) {
   const Time begin = begin_of(scan), end = end_of(scan);
-  return insert({std::move(scan), begin, end});
+  return insert(Frame{std::move(scan), begin, end});
 }
 
 std::optional<FrameQueue::Frame> FrameQueue::push(CameraImage image) {
   const Time t = image.t;
-  return insert({std::move(image), t, t});
+  if (recut_) recutter_.add_image(t);
+  return insert(Frame{std::move(image), t, t});
 }
 
 std::optional<FrameQueue::Frame> FrameQueue::insert(Frame frame) {
@@ -52,7 +60,9 @@ std::optional<FrameQueue::Frame> FrameQueue::pop(Time until) {
 bool FrameQueue::waits_for_scan(Time image, Time until) const {
   if (ended_ || !with_scans_ || !last_middle_ || *last_middle_ + scan_period_ > image) return false;
   const bool has_passed = std::ranges::any_of(frames_, [image](const Frame& f) { return is_scan(f) && f.middle() > image; });
-  return !has_passed && until < image + 6 * scan_period_ / 10 && image - *last_middle_ < 3 * scan_period_;
+  // One that is recut comes with the scan that the image lies in.
+  const auto tenths = recut_ ? 12 : 6;
+  return !has_passed && until < image + tenths * scan_period_ / 10 && image - *last_middle_ < 3 * scan_period_;
 }
 
 }  // namespace kilvo

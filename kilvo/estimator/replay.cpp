@@ -159,9 +159,9 @@ LegModel::Used Replay::apply(Estimate& e, const LegStep& step, Gain<LegModel::ma
   const auto gyro = gyro_at(step.t);
   if (!gyro) return {{step.foot[0].used, step.foot[1].used}, {}, {step.foot[0].used, step.foot[1].used}};
   LegModel model(step, *gyro, config_.legs);
-  // The rows are nearly linear: one iteration.
-  UpdateConfig once;
-  once.max_iterations = 1;
+  // The rows are nearly linear: one iteration, unless the settings ask for more.
+  UpdateConfig once = config_.update;
+  once.max_iterations = config_.legs.iterations;
   Gain<LegModel::max_leg_rows> own;
   Gain<LegModel::max_leg_rows>& gain = kept != nullptr ? *kept : own;
   const Update done = update(e, model, once, nullptr, &gain);

@@ -16,6 +16,27 @@ void SensorStatus::begin(Time t, bool legs) {
   if (legs) last_legs_ = t;
 }
 
+void SensorStatus::sweep_used(Time end) {
+  last_sweep_ = end;
+  sweeps_were_there_ = true;
+  frames_wait_[static_cast<std::size_t>(Sensor::lidar)].reset();
+}
+
+void SensorStatus::image_used(Time t) {
+  last_image_ = t;
+  frames_wait_[static_cast<std::size_t>(Sensor::camera)].reset();
+}
+
+bool SensorStatus::is_missing(Sensor s) const {
+  return s == Sensor::lidar ? sweeps_were_there_ && !has_lidar(modality_) : last_image_.has_value() && !has_camera(modality_);
+}
+
+bool SensorStatus::has_waited_less(Sensor s, Time t, Duration longest) {
+  std::optional<Time>& since = frames_wait_[static_cast<std::size_t>(s)];
+  if (!since) since = t;
+  return t - *since < longest;
+}
+
 void SensorStatus::legs_used(Time t) {
   constexpr double longest = 0.1;  // s
   if (last_legs_) leg_period_ = std::min(longest, to_seconds(t - *last_legs_));

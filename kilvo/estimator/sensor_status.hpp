@@ -22,8 +22,8 @@ class SensorStatus {
   void begin(Time t, bool legs);
 
   /// Something of this sensor at `t` (of a scan: its end) carried the estimate.
-  void sweep_used(Time end) { last_sweep_ = end; }
-  void image_used(Time t) { last_image_ = t; }
+  void sweep_used(Time end);
+  void image_used(Time t);
   void legs_used(Time t);
   /// `were_there`: they have been used before.
   void lose_legs(bool were_there);
@@ -42,6 +42,10 @@ class SensorStatus {
   /// Legs that come again in the middle of an impact would start with wrong contacts (paper, Section IV-E), and which foot stands is told
   /// by what is still, for which the velocity must be known: whether those of `t` may be used, or have waited for long enough.
   bool may_legs_return(Time t, bool is_calm, bool is_velocity_known, const Health& health);
+
+  /// Sweeps or images have been used and are lost. `has_waited_less`: since this was first asked about.
+  bool is_missing(Sensor s) const;
+  bool has_waited_less(Sensor s, Time t, Duration longest);
 
   /// From now on there is no pose, or there is one again.
   void lose_imu(const Health& health);
@@ -63,10 +67,11 @@ class SensorStatus {
   bool with_lidar_;
   Time last_sweep_{};
   std::optional<Time> last_image_;
-  std::optional<Time> last_legs_;  // while the legs are used
-  double leg_period_ = 0;          // between the last two leg samples, s
-  std::optional<Time> legs_wait_;  // since when leg messages come again that are not used yet
-  bool legs_were_there_ = false;
+  std::optional<Time> last_legs_;                              // while the legs are used
+  double leg_period_ = 0;                                      // between the last two leg samples, s
+  std::optional<Time> legs_wait_;                              // since when leg messages come again that are not used yet
+  std::array<std::optional<Time>, sensor_count> frames_wait_;  // the same of sweeps and images
+  bool legs_were_there_ = false, sweeps_were_there_ = false;
   bool imu_lost_ = false;
   Modality modality_ = Modality::coast;
   Reason cause_ = Reason::start;

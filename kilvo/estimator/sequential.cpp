@@ -37,6 +37,7 @@ void Estimator::process_frames(Time until, std::vector<Output>& out) {
 void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector<Output>& out) {
   if (end < history_.base().t) return findings_.drop(Sensor::lidar, Reason::before_state);
   if (history_.replay().is_blind(begin, end)) return findings_.drop(Sensor::lidar, Reason::no_imu);
+  if (must_settle(Sensor::lidar, end)) return findings_.drop(Sensor::lidar, Reason::not_calm);
   if (frames_.last_middle()) lidar_.note_silence(begin - status_.last_sweep());
   Stopwatch watch;
   // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
@@ -52,6 +53,8 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
   if (sweep.refused) return refuse_sweep(*sweep.refused, prior, end);
+  if (config_.lidar.least_ratio > 0 && eigenvalue_ratio(sweep.points) < config_.lidar.least_ratio)
+    return findings_.drop(Sensor::lidar, Reason::agrees_with_nothing);
   history_.resume(sweep.posterior);
   const bool good = keep_plausible(true);
   Output result;
@@ -113,6 +116,7 @@ void Estimator::process(const CameraImage& image) {
   constexpr double scans = 3.5;
   if (image.t - frames_.last_middle().value_or(Time{}) > from_seconds(scans / robot_.lidar.rate)) return refuse(Reason::no_lidar);
   if (lidar_.is_rejoining()) return refuse(Reason::before_rejoined);
+  if (must_settle(Sensor::camera, image.t)) return refuse(Reason::not_calm);
   Stopwatch watch;
   ImageContext context;
   context.prior = history_.at(std::max(image.t, history_.base().t));
@@ -121,7 +125,11 @@ void Estimator::process(const CameraImage& image) {
   context.gyro = history_.replay().gyro_at(image.t).value_or(context.prior.x.bg);
   context.unobservable = lidar_.unobservable();
   context.feet_hold = lidar_.is_blind_somewhere() && status_.has_legs() && legs_.has_stood_lately(image.t);
-  const VisualRegistration seen = vision_->measure(image, context);
+  VisualRegistration seen = vision_->measure(image, context);
+  if (!seen.refused && seen.used < config_.vision.fewest_points) {
+    seen.posterior = context.prior;
+    seen.carries = false;
+  }
   if (seen.refused == Reason::pose_uncertain) return refuse(*seen.refused);
   if (seen.refused == Reason::not_finite) {
     history_.resume(seen.posterior);

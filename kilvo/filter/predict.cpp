@@ -88,11 +88,13 @@ void add_process_noise(Covariance& P, const Motion& m, const Eigen::Vector3d& up
   add(at::bg, at::bg, n.gyro_bias * n.gyro_bias * dt);
   add(at::ba, at::ba, n.accel_bias * n.accel_bias * dt);
   for (int foot = 0; foot < 2; ++foot) {
-    // A foot that does not stand gets none. Round the vertical it is isotropic, so the foot's orientation drops out.
-    if (!feet[static_cast<std::size_t>(foot)]) continue;
+    // A foot that does not stand gets none. Round gravity it is isotropic, so the foot's orientation drops out.
+    const auto& R_IF = feet[static_cast<std::size_t>(foot)];
+    if (!R_IF) continue;
+    const Eigen::Vector3d axis = n.foot_turns ? m.R1 * (*R_IF * Eigen::Vector3d::UnitZ()) : up_W;
     const int pc = at::pcl + 3 * foot;
     add(pc, pc, n.foot * n.foot * dt);
-    P.block<3, 3>(pc, pc) += (n.foot_vertical * n.foot_vertical - n.foot * n.foot) * dt * up_W * up_W.transpose();
+    P.block<3, 3>(pc, pc) += (n.foot_vertical * n.foot_vertical - n.foot * n.foot) * dt * axis * axis.transpose();
   }
   P(at::tau, at::tau) += n.exposure * n.exposure * dt;
 }

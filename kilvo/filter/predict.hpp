@@ -37,6 +37,7 @@ struct ProcessNoise {
   double foot = 0.005;           // m/sqrt(s), of a standing foot, each axis of the foot frame
   double exposure = 0.05;        // 1/sqrt(s)
   double foot_vertical = 0.025;  // m/sqrt(s), of a standing foot against gravity
+  bool foot_turns = false;       // foot_vertical is along the foot's own vertical
 
   static constexpr auto fields() {
     return std::tuple{
@@ -48,6 +49,7 @@ struct ProcessNoise {
         Field{"accel_bias_walk", &ProcessNoise::accel_bias, "m/s^2/sqrt(s)", "random walk of the accelerometer bias"},
         Field{"foot_noise", &ProcessNoise::foot, "m/sqrt(s)", "random walk of a standing foot"},
         Field{"foot_noise_vertical", &ProcessNoise::foot_vertical, "m/sqrt(s)", "the same along the vertical"},
+        Field{"foot_noise_turns", &ProcessNoise::foot_turns, "-", "that vertical is the foot's (paper, Eq. 2), not that of gravity"},
         Field{"exposure_walk", &ProcessNoise::exposure, "1/sqrt(s)", "random walk of the relative inverse exposure"}};
   }
 };

@@ -18,6 +18,11 @@ struct LegConfig {
   double ground_sigma = 0.02;              // m
   double entry_delay = 0.016;              // s
   double gate = 5.0;
+  // What the paper has otherwise: docs/decisions/2026-11-22-what-the-paper-has-otherwise.md.
+  int iterations = 1;
+  std::string adaptation = "foot";  // foot | row | none
+  std::string height = "ki";        // ki | always | never
+  std::string ground = "map";       // map | contacts
 
   static constexpr auto fields() {
     return std::tuple{
@@ -34,7 +39,16 @@ struct LegConfig {
               "standard deviation of a foot's height over the map's ground at touchdown, without LiDAR"},
         Field{"entry_delay", &LegConfig::entry_delay, "s",
               "a foot is used this long after the last sample that did not show its touchdown"},
-        Field{"gate", &LegConfig::gate, "sigma", "a standing foot that moves more than this is not used"}};
+        Field{"gate", &LegConfig::gate, "sigma", "a standing foot that moves more than this is not used"},
+        Field{"iterations", &LegConfig::iterations, "-", "iterations of one update by the legs at most"},
+        Field{"adaptation", &LegConfig::adaptation, "-",
+              "what a foot that moves is believed (Eq. 8): foot (less, all rows of it alike), row (less, each row for itself), none (as "
+              "much)"},
+        Field{"height", &LegConfig::height, "-",
+              "when the height over the ground counts at touchdown: ki (without LiDAR), always (in every modality), never"},
+        Field{
+            "ground", &LegConfig::ground, "-",
+            "which ground that is: map (of the LiDAR's map, else level with the other foot) or contacts (the plane of the last contacts)"}};
   }
 };
 

@@ -4,13 +4,6 @@
 #include <cmath>
 
 namespace kilvo {
-namespace {
-
-// Soles settle and roll: by so much more, in variance, a foot may move before it counts less.
-constexpr double room_to_settle = 20;
-
-}  // namespace
-
 FootVelocityRow foot_velocity(const State& x, const SolePoint& point, const Eigen::Vector3d& gyro) {
   const Eigen::Matrix3d& R = x.R.matrix();
   const Eigen::Vector3d s = (gyro - x.bg).cross(point.p) + point.v;

@@ -14,6 +14,9 @@
 
 namespace kilvo {
 
+/// Soles settle and roll: by so much more, in variance, a foot may move before it counts less.
+inline constexpr double room_to_settle = 20;
+
 /// What one leg sample says about one foot.
 struct Stance {
   bool begins = false;                                   // from now on its contact position is part of the state

@@ -16,6 +16,7 @@ constexpr Duration longest_flight = std::chrono::milliseconds(500);
 LegPipeline::LegUpdate LegPipeline::measure(const Feet& feet, const Estimate& predicted, const ImuSample& imu, const VoxelMap* map,
                                             StanceTracker::Ground ground) {
   LegUpdate out;
+  if (always_height_) ground = StanceTracker::Ground::use;
   leg_length_ = std::max(leg_length_, feet.foot[0].p[0].norm());
   const State& x = predicted.x;
   const Eigen::Vector3d omega = imu.gyro - x.bg;

@@ -14,7 +14,7 @@ namespace kilvo {
 class LegPipeline {
  public:
   /// Throws std::invalid_argument when config.contact names no detector.
-  explicit LegPipeline(const LegConfig& config) : contacts_(config), stances_(config) {}
+  explicit LegPipeline(const LegConfig& config) : contacts_(config), stances_(config), always_height_(config.height == "always") {}
 
   /// What the feet say of `predicted`, the estimate of their time, and what that took. `imu`: of the feet's time. `map`: on whose planes
   /// the feet stand, if any. Allocates nothing.
@@ -48,6 +48,7 @@ class LegPipeline {
  private:
   ContactDetector contacts_;
   StanceTracker stances_;
+  bool always_height_;
   Time last_used_stance_{};  // when a foot was used last
   Time last_stance_{};       // the same, or since when that is waited for
   double leg_length_ = 1;    // m

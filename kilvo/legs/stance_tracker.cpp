@@ -46,9 +46,25 @@ std::array<double, max_corners> share_of_corners(const FootPose& pose, const Sta
   return out;
 }
 
+// Eq. 8 for each row by itself: how much more it deviates than its noise says.
+Eigen::Matrix<double, 7, 1> scale_of_rows(const Eigen::Vector3d& velocity, double velocity2, const Eigen::Vector3d& position,
+                                          double position2) {
+  Eigen::Matrix<double, 7, 1> out = Eigen::Matrix<double, 7, 1>::Ones();
+  out.head<3>() = (velocity.cwiseAbs2() / velocity2).cwiseMax(1.0);
+  out.segment<3>(3) = (position.cwiseAbs2() / position2).cwiseMax(1.0);
+  return out.cwiseMin(loosest * loosest);
+}
+
 }  // namespace
 
-StanceTracker::StanceTracker(const LegConfig& config) : config_(config), step_height_(0, 0.01, 1, 5), noise_(config) {}
+StanceTracker::StanceTracker(const LegConfig& config)
+    : config_(config),
+      step_height_(0, 0.01, 1, 5),
+      noise_(config),
+      adapts_(config.adaptation != "none"),
+      by_row_(config.adaptation == "row"),
+      has_heights_(config.height != "never"),
+      by_contacts_(config.ground == "contacts") {}
 
 void StanceTracker::restart() {
   for (std::size_t side = 0; side < 2; ++side) {
@@ -119,6 +135,19 @@ std::optional<GroundPatch> StanceTracker::level_with_other(std::size_t side, con
   return GroundPatch{normal_W, x.pc[1 - side], sigma};
 }
 
+// The ground under a foot that has just come down.
+void StanceTracker::add_ground(std::size_t side, Stance& foot, const State& x, const VoxelMap* map, const Eigen::Vector3d& normal_W,
+                               Ground ground) {
+  const Eigen::Vector3d p_W = x.pose() * foot.point.p, up_W = -x.g.normalized();
+  if (by_contacts_) {
+    if (ground == Ground::use) foot.ground = places_.of_contacts(up_W);
+    places_.stands_at(p_W);
+    return;
+  }
+  if (map != nullptr) foot.ground = ground_under(*map, p_W, up_W, ground);
+  if (!foot.ground && ground == Ground::use) foot.level = level_with_other(side, p_W, x, normal_W);
+}
+
 // True while the encoders of this foot are frozen.
 bool StanceTracker::stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega) {
   const FootPose& now = feet.foot[side];
@@ -161,9 +190,7 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
       if (!foot.begins) foot.shift += (weights[k] - (*weights_[side])[k]) * pose.p[k];
     }
     weights_[side] = weights;
-    if (foot.begins && map != nullptr) foot.ground = ground_under(*map, x.pose() * foot.point.p, -x.g.normalized(), ground);
-    if (foot.begins && !foot.ground && ground == Ground::use)
-      foot.level = level_with_other(side, x.pose() * foot.point.p, x, contacts.normal);
+    if (foot.begins && has_heights_) add_ground(side, foot, x, map, contacts.normal, ground);
     // Eq. 8: what moves is believed less; so is what has just arrived.
     const Eigen::Vector3d velocity = velocity_W(x, foot.point.p, foot.point.v, omega);
     const double moving2 = velocity.squaredNorm();
@@ -172,7 +199,11 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     const double noise2 = std::max(config_.velocity_sigma * config_.velocity_sigma, usual2) + sigma_v * sigma_v;
     const double entering = std::clamp(1.0 - (phase - config_.entry_delay) / entry_time, 0.0, 1.0);
     // As much as the noise across on all three axes, and as supporting soles usually seem to move, is no motion.
-    const double loose = 1.0 + std::max(0.0, moving2 / noise2 - 3.0) + (loosest - 1) * entering;
+    const bool by_foot = adapts_ && !by_row_;
+    const double loose = 1.0 + (by_foot ? std::max(0.0, moving2 / noise2 - 3.0) : 0.0) + (loosest - 1) * entering;
+    if (by_row_ && !foot.begins)
+      foot.row_scale = scale_of_rows(velocity, noise2, foot_position(x, foot.point, x.pc[side] + x.R * foot.shift).r,
+                                     room_to_settle * config_.position_sigma * config_.position_sigma);
     const double lighter = carries[1 - side] ? std::max(1.0, contacts.load[1 - side] / std::max(least_load, contacts.load[side])) : 1.0;
     foot.variance_scale = std::min(lighter * loose / std::max(0.01, contacts.probability[side]), loosest * loosest);
   }

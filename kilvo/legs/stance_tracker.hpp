@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "kilvo/legs/contact_estimator.hpp"
+#include "kilvo/legs/ground.hpp"
 #include "kilvo/legs/leg_config.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
 #include "kilvo/legs/leg_measurements.hpp"
@@ -40,6 +41,7 @@ class StanceTracker {
   std::array<bool, 2> carriers(const Contacts& contacts, double dt) const;
   std::optional<GroundPatch> level_with_other(std::size_t side, const Eigen::Vector3d& p_W, const State& x,
                                               const Eigen::Vector3d& normal_W);
+  void add_ground(std::size_t side, Stance& foot, const State& x, const VoxelMap* map, const Eigen::Vector3d& normal_W, Ground ground);
   bool stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega);
   LegConfig config_;
   std::optional<Time> last_;
@@ -51,6 +53,8 @@ class StanceTracker {
   std::array<FootPose, 2> last_pose_;
   std::array<Time, 2> changed_{};  // when the encoders of the foot last said something new
   SoleNoise noise_;
+  bool adapts_, by_row_, has_heights_, by_contacts_;  // of the settings
+  GroundLookup places_;                               // of the touchdowns
   StandingRate standing_rate_;
 };
 

@@ -13,19 +13,26 @@ struct LidarConfig {
   double voxel_size = 0.25;    // m
   double gate = 4.0;
   double weak_share = 0.002;
+  double least_ratio = 0;
+  bool recut = false;
 
   /// How far noise carries points of a surface beyond a voxel's face, m.
   double reach() const { return 3 * range_noise; }
 
   static constexpr auto fields() {
-    return std::tuple{Field{"range_noise", &LidarConfig::range_noise, "m", "standard deviation of one measured range"},
-                      Field{"angle_noise", &LidarConfig::angle_noise, "rad", "standard deviation of one beam's direction, each way"},
-                      Field{"voxel_size", &LidarConfig::voxel_size, "m",
-                            "points of a sweep in one cell of this size become one row that weighs as much as they do; at most a quarter "
-                            "of map.voxel_size"},
-                      Field{"gate", &LidarConfig::gate, "sigma", "rows farther from their plane than this are not used"},
-                      Field{"weak_share", &LidarConfig::weak_share, "-",
-                            "a direction with less than this share of a sweep's information on position is not updated"}};
+    return std::tuple{
+        Field{"range_noise", &LidarConfig::range_noise, "m", "standard deviation of one measured range"},
+        Field{"angle_noise", &LidarConfig::angle_noise, "rad", "standard deviation of one beam's direction, each way"},
+        Field{"voxel_size", &LidarConfig::voxel_size, "m",
+              "points of a sweep in one cell of this size become one row that weighs as much as they do; at most a quarter "
+              "of map.voxel_size"},
+        Field{"gate", &LidarConfig::gate, "sigma", "rows farther from their plane than this are not used"},
+        Field{"weak_share", &LidarConfig::weak_share, "-",
+              "a direction with less than this share of a sweep's information on position is not updated"},
+        Field{"least_ratio", &LidarConfig::least_ratio, "-",
+              "a scan that is flatter (smallest eigenvalue of the points' scatter over the largest) is not used, and the "
+              "modality changes as if it were lost; 0: never"},
+        Field{"recut", &LidarConfig::recut, "-", "scans are cut anew so that each ends at an image; false: they are taken as they come"}};
   }
 };
 

@@ -141,7 +141,7 @@ VisualRegistration VisualPipeline::measure(const CameraImage& image, const Image
 // Lamps are switched and exposures jump: what it was says nothing, the image all.
 void VisualPipeline::adapt_exposure(Work& work) const {
   Estimate& prior = work.prior;
-  const auto exposure = work.model.exposure_at(prior.x);
+  const auto exposure = config_.adapt_exposure ? work.model.exposure_at(prior.x) : std::nullopt;
   if (!exposure) return;
   prior.x.tau = std::exp(exposure->log);
   const double unsure = exposure->sigma * prior.x.tau;
@@ -278,7 +278,7 @@ void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const S
     if (project_to_plane(map, -(first.R.inverse() * first.p), point))
       map_.refresh(track.point, point.p_W, point.normal_W, point.variance, point.node);
     const auto pixel = camera_.project(T_CW * point.p_W);
-    if (!is_new_view(track) || !pixel || !camera_.sees(*pixel, border)) continue;
+    if (!config_.new_views || !is_new_view(track) || !pixel || !camera_.sees(*pixel, border)) continue;
     const Eigen::Vector2f stored = pixel->cast<float>();
     if (const auto patch = cut_patch(work.pyramid, stored.cast<double>()))
       map_.observe(track.point, {.frame = frame, .pixel = stored, .patch = *patch});

@@ -1,0 +1,26 @@
+// Scans cut anew so that each ends at an image, as the paper has it (Section IV-D): the way to compare with. Ours takes both as they are.
+#pragma once
+
+#include <vector>
+
+#include "kilvo/sensors/measurement.hpp"
+
+namespace kilvo {
+
+class ScanRecutter {
+ public:
+  /// `longest`: without an image, what has come in so long is a scan.
+  explicit ScanRecutter(Duration longest) : longest_(longest) {}
+
+  /// Each in the order of time.
+  void add_image(Time t) { cuts_.push_back(t); }
+  /// The scans that are complete with this one.
+  std::vector<LidarScan> add(const LidarScan& scan);
+
+ private:
+  Duration longest_;
+  std::vector<Time> cuts_;  // images that no scan has ended at
+  LidarScan rest_;
+};
+
+}  // namespace kilvo
