@@ -18,6 +18,7 @@ std::vector<LidarScan> ScanRecutter::add(const LidarScan& scan) {
   const Time end = end_of(scan);
   for (const Time cut : cuts_) {
     if (cut > end) break;
+    if (rest_.points.empty() || cut - begin_of(rest_) < longest_ / 2) continue;  // too little to be a scan: the next cut takes it
     const auto is_before = [&](const LidarPoint& p) { return rest_.t + Duration(p.offset_ns) <= cut; };
     const auto middle = std::stable_partition(rest_.points.begin(), rest_.points.end(), is_before);
     if (middle != rest_.points.begin()) out.push_back({rest_.t, {rest_.points.begin(), middle}});

@@ -22,13 +22,13 @@ TEST(ScanRecutter, EachScanEndsAtAnImageAndNoPointIsLost) {
   ScanRecutter recutter(milliseconds(110));
   std::vector<LidarScan> parts;
   for (int k = 0; k < 5; ++k) {
-    recutter.add_image(start + milliseconds(100 * k + 30));
+    recutter.add_image(start + milliseconds(100 * k + 60));
     for (LidarScan& part : recutter.add(scan_from(100 * k))) parts.push_back(std::move(part));
   }
   ASSERT_EQ(parts.size(), 5U);
   float expected = 0;
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    EXPECT_EQ(end_of(parts[k]), start + milliseconds(100 * static_cast<int>(k) + 30));
+    EXPECT_EQ(end_of(parts[k]), start + milliseconds(100 * static_cast<int>(k) + 60));
     for (const LidarPoint& p : parts[k].points) {
       EXPECT_EQ(p.x, expected++);
       EXPECT_EQ(parts[k].t + Duration(p.offset_ns), start + milliseconds(static_cast<int>(p.x)));
