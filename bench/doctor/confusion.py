@@ -48,6 +48,84 @@ def scaled_urdf(text, link, factor):
     return re.sub(r"<joint .*?</joint>", change, text, flags=re.S)
 
 
+def flipped_axis(text, joint):
+    """The axis of this joint the other way round."""
+    return re.sub(r'(<joint name="%s".*?<axis xyz=")([^"]+)(")' % joint,
+                  lambda m: m.group(1) + " ".join(str(-float(x)) for x in m.group(2).split()) + m.group(3), text, count=1, flags=re.S)
+
+
+def leg_cases(config, folder, work):
+    """Wrong legs of a robot whose joints are named as those of the G1."""
+    text = open(os.path.join(folder, config["robot"]["urdf"])).read()
+    if "left_knee_link" not in text:
+        return []
+    out = []
+
+    def urdf(name, changed, right):
+        path = os.path.join(work, re.sub("[^a-z0-9]+", "_", name.lower()) + ".urdf")
+        open(path, "w").write(changed)
+        out.append((name, ["robot.urdf=" + path], right))
+
+    for joint in ("left_hip_pitch", "right_hip_yaw", "left_ankle_pitch", "right_ankle_roll", "right_knee"):
+        urdf(f"sign of {joint}", flipped_axis(text, joint + "_joint"), ["joint_sign"])
+    urdf("signs of both hip rolls", flipped_axis(flipped_axis(text, "left_hip_roll_joint"), "right_hip_roll_joint"), ["joint_sign"])
+    urdf("thigh 10 % longer", scaled_urdf(scaled_urdf(text, "left_hip_yaw_link", 1.1), "right_hip_yaw_link", 1.1), ["leg_lengths"])
+    urdf("one shin 10 % longer", scaled_urdf(text, "left_knee_link", 1.1), ["leg_lengths"])
+    urdf("legs 10 % shorter", scaled_urdf(scaled_urdf(scaled_urdf(scaled_urdf(
+        text, "left_hip_yaw_link", 0.9), "right_hip_yaw_link", 0.9), "left_knee_link", 0.9), "right_knee_link", 0.9), ["leg_lengths"])
+    shipped = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "config", "robots")
+    other = "g1_12dof.urdf" if "waist_yaw_joint\" type=\"revolute" in text else "sim.urdf"
+    locked = ["robot.locked_joints=[waist_yaw_joint]"] if other == "sim.urdf" else []
+    out.append(("another robot's URDF", ["robot.urdf=" + os.path.join(shipped, other)] + locked,
+                ["leg_lengths", "urdf", "imu_mount_position", "imu_link"]))
+    feet = config["robot"]["feet"]
+    on_shin = [dict(foot, link=foot["link"].replace("ankle_roll", "knee")) for foot in feet]
+    out.append(("feet on the shins", ["robot.feet=" + json.dumps(on_shin)], ["foot_link", "urdf", "leg_lengths"]))
+    in_mm = [dict(foot, sole=[[1000 * x for x in corner] for corner in foot["sole"]]) for foot in feet]
+    out.append(("soles in millimetres", ["robot.feet=" + json.dumps(in_mm)], ["sole_unit"]))
+    return out
+
+
+def mount_cases(config):
+    """More wrong mounts, clocks and intrinsics."""
+    out = []
+    link_R, link_p = pose(config["imu"]["T_link_imu"]) if "T_link_imu" in config["imu"] else (np.eye(3), np.zeros(3))
+    if "lidar" in config:
+        R, p = pose(config["lidar"]["T_imu_lidar"])
+        key = "lidar.T_imu_lidar"
+        for name, axis, angle in (("pitched by 10", "y", 10), ("rolled by 3", "x", 3), ("yawed by 2", "z", 2), ("rolled by 90", "x", 90)):
+            out.append((f"LiDAR {name}", texts(key, R @ rotation(axis, angle)), ["lidar_rotation"]))
+        out.append(("LiDAR's position negated", texts(key, p=-p), ["lidar_position", "lidar_inverted"]))
+        out.append(("LiDAR's mount on the link", texts(key, link_R @ R, link_R @ p + link_p), ["lidar_rotation", "lidar_position"]))
+        out.append(("LiDAR clock 50 ms", ["lidar.time_offset=0.05"], ["lidar_clock"]))
+    if "legs" in config and config["legs"].get("type", "joints") == "joints":
+        key = "imu.T_link_imu"
+        out.append(("legs' clock 30 ms", ["legs.time_offset=0.03"], ["legs_clock"]))
+        out.append(("IMU's mount left out", texts(key, np.eye(3), np.zeros(3)), ["imu_mount_rotation", "imu_mount_position", "imu_link"]))
+        out.append(("IMU 10 cm higher on its link", texts(key, p=link_p + [0, 0, 0.1]), ["imu_mount_position", "imu_link"]))
+        out.append(("IMU rolled by 180 on its link", texts(key, rotation("x", 180) @ link_R), ["imu_mount_rotation"]))
+        out.append(("IMU on the shin", ["imu.T_link_imu.link=left_knee_link" if "ankle" in str(config["robot"]) else "imu.T_link_imu.link=l_lower_leg"],
+                    ["imu_link", "imu_mount_rotation"]))
+    out.append(("IMU clock -10 ms", ["imu.time_offset=-0.01"], ["imu_clock"] if "lidar" in config else ["imu_clock", "legs_clock"]))
+    if "camera" in config:
+        R, p = pose(config["camera"]["T_imu_camera"])
+        c, key = config["camera"], "camera.T_imu_camera"
+        for name, axis, angle in (("rolled by 90", "z", 90), ("yawed by 10", "y", 10), ("rolled by 4", "z", 4)):
+            out.append((f"camera {name}", texts(key, R @ rotation(axis, angle)), ["camera_rotation"]))
+        out.append(("camera's rotation inverted", texts(key, R.T), ["camera_inverted", "camera_rotation"]))
+        out.append(("camera's mount on the link", texts(key, link_R @ R, link_R @ p + link_p), ["camera_rotation"]))
+        out.append(("camera's cx off by 20 %", [f"camera.cx={1.2 * c['cx']}"], ["camera_principal_point"]))
+        out.append(("camera's cy off by 20 %", [f"camera.cy={0.8 * c['cy']}"], ["camera_principal_point"]))
+        out.append(("camera's size halved", [f"camera.width={c['width'] // 2}", f"camera.height={c['height'] // 2}"], ["camera_size"]))
+        out.append(("camera of half the size", [f"camera.{k}={c[k] / 2:g}" for k in ("fx", "fy", "cx", "cy")], ["camera_focal", "camera_principal_point"]))
+        out.append(("camera's fx 10 % longer", [f"camera.fx={1.1 * c['fx']}", f"camera.fy={1.1 * c['fy']}"], ["camera_focal"]))
+        out.append(("camera's fx and fy 1.5 times", [f"camera.fx={1.5 * c['fx']}", f"camera.fy={1.5 * c['fy']}"], ["camera_focal"]))
+        for ms in (-50, 100):
+            out.append((f"camera's clock {ms} ms", [f"camera.time_offset={ms / 1000}"], ["camera_clock"]))
+        out.append(("camera's rate", ["camera.rate=30"], ["camera_rate"]))
+    return out
+
+
 def description_cases(config, folder, work):
     """name, overrides of the configuration, causes of which one is right"""
     out = [("right", [], [])]
@@ -120,7 +198,9 @@ def description_cases(config, folder, work):
         out.append(("camera's size", ["camera.width=1280", "camera.height=1024"], ["camera_size"]))
         for ms in (10, 200):
             out.append((f"camera's clock {ms} ms", [f"camera.time_offset={ms / 1000}"], ["camera_clock"]))
-    return out
+    if "legs" in config and config["legs"].get("type", "joints") == "joints":
+        out += leg_cases(config, folder, work)
+    return out + mount_cases(config)
 
 
 # --- faults of the messages ---------------------------------------------------------------------------------------------------------
@@ -178,6 +258,17 @@ def exchanged(a, b):
     return change
 
 
+def exchanged_in_both(a, b):
+    def change(m):
+        m.name = [n.replace(a, "#").replace(b, a).replace("#", b) for n in m.name]
+    return change
+
+
+def negated(m):
+    m.position = [-q for q in m.position]
+    m.velocity = [-q for q in m.velocity]
+
+
 def without_gravity():
     mean = []
 
@@ -233,6 +324,14 @@ def data_cases(config):
     if "legs" in config:
         out += [("hip pitch off by 90", each_legs(offset_of("left_hip_pitch_joint", math.pi / 2)), ["joint_offset"]),
                 ("hip roll and yaw of one leg exchanged", each_legs(exchanged("left_hip_roll_joint", "left_hip_yaw_joint")), ["joints_exchanged"])]
+    out += [("gyro's x flipped", each_imu(lambda w, a: (w * [-1, 1, 1], a)), ["imu_axes"]),
+            ("accelerometer's z flipped", each_imu(lambda w, a: (w, a * [1, 1, -1])), ["imu_axes"]),
+            ("gyro of half the rate", each_imu(lambda w, a: (0.5 * w, a)), ["gyro_unit"])]
+    if "legs" in config:
+        out += [("knees and ankles exchanged", each_legs(exchanged_in_both("knee", "ankle_pitch")), ["joints_exchanged"]),
+                ("hip rolls and yaws exchanged", each_legs(exchanged_in_both("hip_roll", "hip_yaw")), ["joints_exchanged"]),
+                ("a knee off by 15 degrees", each_legs(offset_of("right_knee_joint", math.radians(15))), ["joint_offset"]),
+                ("all joints the other way round", each_legs(negated), ["joint_sign"])]
     if "lidar" in config:
         out.append(("LiDAR's z flipped", mirrored, ["lidar_axes"]))
     if "legs" in config:

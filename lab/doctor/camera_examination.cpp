@@ -59,6 +59,16 @@ std::vector<CameraHypothesis> hypotheses(const CameraMount& m) {
     add("camera_focal", fmt::format("the camera's fy is {} of the right one", factor > 1 ? "half" : "twice"), "camera.fy", c,
         {{"camera.fy", number_text(c.fy)}});
   }
+  for (const double factor : {2.0, 0.5}) {
+    c = m;
+    for (double* x : {&c.fx, &c.fy, &c.cx, &c.cy}) *x *= factor;
+    add("camera_focal", fmt::format("the camera's intrinsics are those of images of {} the size", factor > 1 ? "half" : "twice"),
+        "camera.fx, camera.fy, camera.cx, camera.cy", c,
+        {{"camera.fx", number_text(c.fx)},
+         {"camera.fy", number_text(c.fy)},
+         {"camera.cx", number_text(c.cx)},
+         {"camera.cy", number_text(c.cy)}});
+  }
   for (const Eigen::Matrix3d& p : signed_permutations()) {
     if (p.determinant() < 0 || p.isApprox(Eigen::Matrix3d::Identity())) continue;
     c = m;
@@ -165,6 +175,40 @@ bool Examination::try_camera_hypotheses(const CameraTracks& tracks) {
   return true;
 }
 
+// A principal point that is off moves the image as a turn of the camera does, but for its corners.
+bool Examination::accuse_principal_point(const CameraTracks& tracks, const CameraFit& fit) {
+  const CameraMount& m = robot_.camera;
+  const Eigen::Vector3d turn = fit.fit.x.head<3>();
+  CameraMount best = m;
+  double error = 0.97 * fit.error, least = 0.3 * turn.norm();
+  for (const double side : {1.0, -1.0}) {
+    CameraMount c = m;
+    c.cx += side * m.fx * std::tan(turn.y());
+    c.cy -= side * m.fy * std::tan(turn.x());
+    const CameraFit other = tracks.fit({c, 0}, true, true);
+    if (!other.fit.good || other.error > error || other.fit.x.head<3>().norm() > least) continue;
+    const Eigen::Vector3d rest = other.fit.x.head<3>();
+    best = c;
+    best.cx += side * m.fx * std::tan(rest.y());
+    best.cy -= side * m.fy * std::tan(rest.x());
+    error = other.error;
+  }
+  if (best.cx == m.cx && best.cy == m.cy) return false;
+  const double off = std::hypot(best.cx - m.cx, best.cy - m.cy);
+  find({Sensor::camera,
+        "camera_principal_point",
+        fmt::format("the camera's principal point is about ({:.0f}, {:.0f}) px, described as ({:.0f}, {:.0f})", best.cx, best.cy, m.cx,
+                    m.cy),
+        fmt::format("corners of the images are {:.2f} px from their epipolar lines then, {:.2f} px with a turned camera", error, fit.error),
+        "camera.cx, camera.cy",
+        off,
+        "px",
+        {{"camera.cx", fmt::format("{:.1f}", best.cx)}, {"camera.cy", fmt::format("{:.1f}", best.cy)}},
+        true});
+  robot_.camera = best;
+  return true;
+}
+
 void Examination::examine_camera_fit(const CameraTracks& tracks) {
   const CameraFit fit = tracks.fit({robot_.camera, 0}, true, true);
   if (!fit.fit.good) {
@@ -181,13 +225,14 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
     return;
   }
   const SO3 before = robot_.camera.T_imu_camera.R;
-  constexpr double method = 0.3, focal_method = 0.005, clock_method = 0.0004;  // degrees, of the focal length, s
+  constexpr double method = 0.08, focal_method = 0.0025, clock_method = 0.0002;  // degrees, of the focal length, s
   refine_rotation(Sensor::camera, "rotation of the camera on the IMU", before, fit.R_IC, sigma, method, "camera.T_imu_camera.R");
   Refinement r = refinement(Sensor::camera, "focal length", {fit.focal - 1}, {fit.fit.sigma(3)}, focal_method, 0.01, fmt::format("-"));
   r.changes = {{"camera.fx", fmt::format("{:.3f}", fit.focal * robot_.camera.fx)},
                {"camera.fy", fmt::format("{:.3f}", fit.focal * robot_.camera.fy)}};
   refinements_.push_back(std::move(r));
   refine_offset(Sensor::camera, fit.offset, fit.fit.sigma(4), clock_method);
+  if (angle > std::max(rotation_tolerance, sure * uncertain) && angle < 15 && accuse_principal_point(tracks, fit)) return;
   if (angle > std::max(rotation_tolerance, sure * uncertain)) {
     Finding f;
     f.sensor = Sensor::camera;

@@ -37,64 +37,6 @@ Eigen::Vector3d direction_of(const std::vector<Eigen::Vector3d>& normals) {
 
 }  // namespace
 
-LidarWay::LidarWay(const std::vector<SweepPose>& poses, const SE3& T_IL, double offset, const std::vector<InertialSample>& imu,
-                   const GyroPath& gyro, const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
-  constexpr double weak = 0.02;  // share of the sweep's information: below it the LiDAR does not know its way
-  std::vector<Pose> sweeps;
-  for (const SweepPose& p : poses) {
-    if (!p.good || p.weakest < weak) continue;
-    Pose pose{p.t + offset, p.T_WL * T_IL.inverse()};
-    // A sweep gives the mean of the way during it, which is off its middle by a T^2 / 24.
-    const double a = p.begin + offset, b = p.end + offset;
-    Eigen::Vector3d force = Eigen::Vector3d::Zero();
-    double n = 0;
-    for (auto it = std::ranges::lower_bound(imu, a, {}, &InertialSample::t); it != imu.end() && it->t < b; ++it) {
-      force += pose.T_WI.R * SO3::from_quaternion(gyro.between(pose.t, it->t)) * Eigen::Vector3d(it->accel - ba);
-      n += 1;
-    }
-    if (n > 0) pose.T_WI.p -= (b - a) * (b - a) / 24 * (force / n + g_W);
-    sweeps.push_back(pose);
-  }
-  for (std::size_t i = 1; i < sweeps.size(); ++i) {
-    if (sweeps[i].t - sweeps[i - 1].t < 0.35) bridge(sweeps[i - 1], sweeps[i], imu, gyro, g_W, ba);
-  }
-}
-
-// Double integration from one sweep to the next; the velocity at its beginning is the one with which it ends where the next sweep says.
-void LidarWay::bridge(const Pose& a, const Pose& b, const std::vector<InertialSample>& imu, const GyroPath& gyro,
-                      const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
-  if (!gyro.covers(a.t, b.t)) return;
-  std::vector<Pose> steps{a};
-  Eigen::Vector3d v = Eigen::Vector3d::Zero();
-  auto it = std::ranges::lower_bound(imu, a.t, {}, &InertialSample::t);
-  for (double t = a.t; t < b.t && it != imu.end(); ++it) {
-    const double next = std::min(it->t, b.t), dt = next - t;
-    if (!(dt > 0)) continue;
-    const SO3 R = a.T_WI.R * SO3::from_quaternion(gyro.between(a.t, 0.5 * (t + next)));
-    const Eigen::Vector3d force = R * Eigen::Vector3d(it->accel - ba) + g_W;
-    Pose pose{next, {a.T_WI.R * SO3::from_quaternion(gyro.between(a.t, next)), steps.back().T_WI.p + dt * v + 0.5 * dt * dt * force}};
-    v += dt * force;
-    steps.push_back(pose);
-    t = next;
-  }
-  const double span = steps.back().t - a.t;
-  if (!(span > 0) || b.t - steps.back().t > 0.05) return;
-  const Eigen::Vector3d missing = (b.T_WI.p - steps.back().T_WI.p) / span;
-  for (Pose& pose : steps) {
-    pose.T_WI.p += (pose.t - a.t) * missing;
-    if (poses_.empty() || pose.t > poses_.back().t) poses_.push_back(pose);
-  }
-}
-
-std::optional<SE3> LidarWay::at(double t, const GyroPath& gyro) const {
-  const auto after = std::ranges::upper_bound(poses_, t, {}, &Pose::t);
-  if (after == poses_.begin() || after == poses_.end()) return std::nullopt;
-  const Pose &a = *std::prev(after), &b = *after;
-  if (b.t - a.t > 0.06) return std::nullopt;
-  const double s = (t - a.t) / (b.t - a.t);
-  return SE3{a.T_WI.R * SO3::from_quaternion(gyro.between(a.t, t)), (1 - s) * a.T_WI.p + s * b.T_WI.p};
-}
-
 CameraTracks::CameraTracks(const std::vector<TrackedPair>& tracks, const GyroPath& gyro, const LidarWay* way) : gyro_(gyro), way_(way) {
   std::vector<const TrackedPair*> all;
   for (const TrackedPair& pair : tracks) {

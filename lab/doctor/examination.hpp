@@ -65,6 +65,8 @@ class Examination {
   bool examine_leg_names();
   /// Legs that hardly turn show how they bend, not how they are mounted.
   bool legs_turned() const;
+  bool feet_stand() const;
+  bool try_standing_hypotheses();
   struct LegScore {
     double explained = 0, flatness = 0;  // share; degrees
     double offset = 0;
@@ -95,8 +97,9 @@ class Examination {
   void examine_camera();
   bool try_camera_hypotheses(const CameraTracks& tracks);
   void examine_camera_fit(const CameraTracks& tracks);
+  bool accuse_principal_point(const CameraTracks& tracks, const CameraFit& fit);
 
-  GyroPath gyro() const { return {recorded_.imu, gyro_axes_, Eigen::Vector3d::Zero()}; }
+  GyroPath gyro() const { return {recorded_.imu, gyro_axes_, gyro_bias_}; }
   SenseAgreement agreement(const std::vector<Turn>& turns, const SO3& mount, double least_explained) const;
   std::vector<InertialSample> mended_imu() const;
   /// Without places where the LiDAR's way is not known.
@@ -114,7 +117,8 @@ class Examination {
   Robot robot_, original_;
   Eigen::Matrix3d gyro_axes_ = Eigen::Matrix3d::Identity();  // take what was written to rad/s and m/s^2 in the IMU frame
   Eigen::Matrix3d accel_axes_ = Eigen::Matrix3d::Identity();
-  std::vector<SweepPose> rigid_, way_;  // the LiDAR's way without and with the gyro's help
+  Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();  // rad/s, by the LiDAR
+  std::vector<SweepPose> rigid_, way_;                   // the LiDAR's way without and with the gyro's help
   std::vector<Turn> lidar_turns_, leg_turns_;
   SenseAgreement lidar_, legs_;
   std::optional<LegHypothesis> leg_mend_;

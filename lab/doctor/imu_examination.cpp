@@ -197,7 +197,9 @@ void Examination::settle_axes() {
   double rms = 0;
   if (const auto as_gyro = rows.fit(G * accel_axes_)) {
     rms = as_gyro->rms;
-    double best = 0.6 * as_gyro->rms;
+    // A robust standard deviation of n rows is known to 1 / sqrt(n); wrong axes leave a fifth more than right ones, sweeps being rough.
+    const double n = static_cast<double>(rows.size());
+    double best = std::min(0.88, 1 - 2.5 / std::sqrt(n)) * as_gyro->rms;
     for (const Eigen::Matrix3d& axes : signed_permutations()) {
       const auto other = rows.fit(axes * accel_axes_);
       if (!other || other->rms >= best) continue;
@@ -215,7 +217,8 @@ void Examination::settle_axes() {
   const bool proper = G.determinant() > 0 && A.isApprox(G, 1e-9);
   const bool legs_disagree_too = legs_.known && nearest_permutation(legs_.error).transpose().isApprox(G, 1e-9);
   // Points that are mirrored by M turn by -M and move by M: one fault of the LiDAR, two of the IMU.
-  const bool mirrored = G.determinant() > 0 && A.isApprox(-G, 1e-9);
+  // All three reversed at once is an accelerometer of the other sign.
+  const bool mirrored = G.determinant() > 0 && A.isApprox(-G, 1e-9) && !is_identity(G);
   if ((proper || mirrored) && !legs_disagree_too) return;  // the LiDAR's mount: examined next
   accuse_imu_axes(G, A, evidence);
   lidar_ = agreement(lidar_turns_, robot_.lidar.T_imu_lidar.R, 0.8);

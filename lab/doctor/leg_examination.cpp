@@ -110,6 +110,25 @@ bool Examination::examine_leg_names() {
           true});
     std::swap(robot_.feet[0], robot_.feet[1]);
   }
+  double farthest = 0;
+  for (auto& foot : robot_.feet) {
+    for (const Eigen::Vector3d& corner : foot.sole) farthest = std::max(farthest, corner.norm());
+  }
+  constexpr double no_foot = 1;  // m
+  if (farthest > no_foot) {
+    find({Sensor::legs,
+          "sole_unit",
+          fmt::format("a corner of the soles is {:.0f} m from its link: they are in millimetres", farthest),
+          "no foot is as long",
+          "robot.feet: sole, in metres",
+          farthest,
+          "m",
+          {},
+          true});
+    for (auto& foot : robot_.feet) {
+      for (Eigen::Vector3d& corner : foot.sole) corner *= 1e-3;
+    }
+  }
   double largest = 0;
   std::size_t beyond = 0, count = 0;
   for (const LegSample& s : recorded_.legs) {
@@ -159,11 +178,11 @@ void Examination::examine_legs() {
   legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
   // A clock that is off first: any joint looks wrong at another time.
   leg_offset_ = legs_.known ? legs_.offset : 0;
-  if (try_leg_hypotheses()) {
+  if (try_leg_hypotheses() || try_standing_hypotheses()) {
     leg_turns_ = leg_turns(legs_under(nullptr), interval);
     legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
   }
-  if (!legs_.known) {
+  if (!legs_.known && !feet_stand()) {
     // The legs of another robot: the LiDAR and the gyro agree, the legs turn, and under no hypothesis as they do.
     const std::string detail =
         fmt::format("{:.0f} % of the legs' turning is that of the gyro at best: no walk, or slow or rough encoders", 100 * legs_.explained);

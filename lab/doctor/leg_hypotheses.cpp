@@ -201,6 +201,29 @@ std::vector<LegHypothesis> leg_hypotheses(const Recorded& recorded, const Robot&
   return out;
 }
 
+std::vector<LegHypothesis> foot_link_hypotheses(const Robot& robot) {
+  std::vector<LegHypothesis> out;
+  const std::vector<std::string> links = link_names(robot.urdf);
+  for (const std::string& link : links) {
+    const std::string other = other_side(link);
+    // Each pair once, by its first link; the feet's sides as they are described.
+    if (other == link || link == robot.feet[0].link || other == robot.feet[0].link) continue;
+    if (std::ranges::find(links, other) <= std::ranges::find(links, link) || std::ranges::find(links, other) == links.end()) continue;
+    const bool first = other_side(robot.feet[0].link) == robot.feet[1].link && robot.feet[0].link.substr(0, 2) == link.substr(0, 2);
+    const std::string left = first ? link : other, right = first ? other : link;
+    LegHypothesis h;
+    h.cause = "foot_link";
+    h.name = fmt::format("the soles are on links {} and {}, not on {} and {}", left, right, robot.feet[0].link, robot.feet[1].link);
+    h.setting = fmt::format("robot.feet: link: {} and {}", left, right);
+    h.robot = [left, right](Robot& r) {
+      r.feet[0].link = left;
+      r.feet[1].link = right;
+    };
+    out.push_back(h);
+  }
+  return out;
+}
+
 std::vector<std::string> link_names(const std::string& urdf) {
   std::vector<std::string> out;
   const std::regex pattern("<link\\s+name\\s*=\\s*\"([^\"]+)\"");

@@ -21,6 +21,8 @@ LegHypothesis degrees_hypothesis();
 LegHypothesis joined(const LegHypothesis& a, const LegHypothesis& b);
 
 /// Links and joints of a URDF, in the order of the document.
+/// The soles on other links of both legs.
+std::vector<LegHypothesis> foot_link_hypotheses(const Robot& robot);
 std::vector<std::string> link_names(const std::string& urdf);
 
 }  // namespace kilvo::lab

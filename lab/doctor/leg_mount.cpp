@@ -8,8 +8,8 @@ namespace kilvo::lab {
 namespace {
 
 constexpr double rotation_tolerance = 2.5;  // degrees
-// s, with and without a LiDAR: soles that roll shift it by 6 ms, soft ones by more.
-constexpr double clock_tolerance = 0.009, alone_clock_tolerance = 0.025;
+// s, with and without a LiDAR: without one, soles that roll shift it by 6 ms, soft ones by more.
+constexpr double clock_tolerance = 0.0045, alone_clock_tolerance = 0.025;
 constexpr double sure = 4;  // standard deviations
 
 }  // namespace
@@ -35,10 +35,6 @@ MountFit Examination::measure_leg_mount() const {
 void Examination::examine_leg_rotation() {
   const SO3 described = robot_.imu.T_link_imu.R.inverse();
   MountFit fit = measure_leg_mount();
-  if (!fit.fit.good) {
-    check(Sensor::legs, "mount of the IMU", Check::Verdict::unknown, "too few steps");
-    return;
-  }
   // What soles that roll and links that bend shift both by shows in what is not explained.
   const double unexplained = std::max(0.0, 1 - fit.explained);
   double method = 0.2 + 10 * unexplained, clock_method = 0.001 + 0.04 * unexplained;  // degrees, s
@@ -46,20 +42,28 @@ void Examination::examine_leg_rotation() {
   Robot start = robot_;
   const double far = degrees((fit.R * described.inverse()).Log().norm());
   constexpr double near = 15;  // degrees
-  if (far > near) start.imu.T_link_imu.R = fit.R.inverse();
+  if (fit.fit.good && far > near) start.imu.T_link_imu.R = fit.R.inverse();
   StanceFit stances;
-  if (!way.empty()) stances = fit_stances(recorded_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(), fit.offset);
+  if (!way.empty())
+    stances = fit_stances(recorded_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(), fit.fit.good ? fit.offset : leg_offset_);
+  if (!fit.fit.good && !stances.good) {
+    check(Sensor::legs, "mount of the IMU", Check::Verdict::unknown, "too few steps");
+    return;
+  }
   if (stances.good) {
+    if (!fit.fit.good) fit.fit.cov = Eigen::MatrixXd::Zero(7, 7);
+    fit.fit.good = true;
     fit.R = stances.R_link_imu.inverse();
     fit.offset = stances.offset;
     for (int i = 0; i < 3; ++i) fit.fit.cov(i, i) = stances.rotation_sigma[i] * stances.rotation_sigma[i];
     fit.fit.cov(3, 3) = stances.offset_sigma * stances.offset_sigma;
-    constexpr double stance_method = 0.2, stance_clock_method = 0.002;  // degrees, s
+    constexpr double stance_method = 0.2, stance_clock_method = 0.0004;  // degrees, s
     method = stance_method;
     clock_method = stance_clock_method;
   }
   leg_offset_ = fit.offset;
   refine_rotation(Sensor::imu, "rotation of the IMU on the robot", described, fit.R, fit.rotation_sigma(), method, "imu.T_link_imu.R");
+  for (double& x : refinements_.back().change) x = -x;  // of the mount, not of its inverse
   refinements_.back().changes = {{"imu.T_link_imu.R", rotation_text(fit.R.inverse())}};
   if (!recorded_.leg_clock_is_found) refine_offset(Sensor::legs, fit.offset, fit.offset_sigma(), clock_method);
   if (stances.good) refine_zeros(stances);
@@ -77,6 +81,7 @@ void Examination::examine_leg_rotation() {
   } else {
     check(Sensor::imu, "rotation of its mount on the robot", uncertain > 3 ? Check::Verdict::unknown : Check::Verdict::good, detail);
   }
+  if (stances.good) fit.explained = 1;  // the feet stand
   examine_leg_clock(fit, clock_method, stances.good ? clock_tolerance : alone_clock_tolerance);
 }
 

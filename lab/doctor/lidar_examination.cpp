@@ -13,6 +13,7 @@ constexpr double rotation_tolerance = 0.7;  // degrees
 constexpr double worth_a_note = 0.08;       // degrees
 constexpr double clock_tolerance = 0.0035;  // s
 constexpr double sure = 4;                  // standard deviations
+constexpr double believable = 0.2;          // m/s, that the acceleration and the way may be apart by
 constexpr double very_sure = 7;             // of a gyro whose own axes may be half a degree off
 
 double mean_thickness(const std::vector<SweepPose>& way) {
@@ -95,8 +96,8 @@ void Examination::examine_point_times() {
   }
   const GyroPath path = gyro();
   const SO3 start = SO3::nearest(lidar_.error * robot_.lidar.T_imu_lidar.R.matrix());
-  const MountFit fit = fit_mount(lidar_turns_, path, start, lidar_.offset);
-  Deskew deskew{&path, fit.fit.good ? fit.R : start, fit.fit.good ? fit.offset : lidar_.offset, false};
+  const MountFit first = fit_mount(lidar_turns_, path, start, lidar_.offset);
+  Deskew deskew{&path, first.fit.good ? first.R : start, first.fit.good ? first.offset : lidar_.offset, false};
   // The stretch that turns most.
   std::size_t best = 0;
   double most = -1;
@@ -139,8 +140,22 @@ void Examination::examine_point_times() {
   // Once more with the mount and the clock that follow: sweeps taken as rigid shift both a little.
   const MountFit again = fit_mount(turns_of(way_), path, deskew.R_IL, deskew.offset);
   if (!again.fit.good) return;
+  gyro_bias_ = again.bias;
+  const GyroPath better = gyro();
+  deskew.gyro = &better;
   deskew.R_IL = again.R;
   deskew.offset = again.offset;
+  // What the acceleration says of the velocity within a sweep; with a wrong description it fits nothing, and is left out.
+  const auto fit = TranslationRows(way_, recorded_.imu, better, again.R, again.offset).fit(accel_axes_);
+  // A place that is hardly known would make the way that it is measured by.
+  SE3 T_IL{again.R, robot_.lidar.T_imu_lidar.p};
+  for (int i = 0; fit && i < 3; ++i) {
+    if (std::abs(fit->r[i] - T_IL.p[i]) > sure * fit->sigma_r(i)) T_IL.p[i] = fit->r[i];
+  }
+  const LidarWay swung(fit && fit->rms < believable ? way_ : std::vector<SweepPose>{}, T_IL, again.offset, mended_imu(), better,
+                       fit ? fit->g_W : Eigen::Vector3d::Zero(), fit ? fit->ba : Eigen::Vector3d::Zero());
+  deskew.way = swung.empty() ? nullptr : &swung;
+  deskew.p_IL = T_IL.p;
   way_ = scan_odometry(recorded_.sweeps, deskew);
 }
 
@@ -157,7 +172,7 @@ void Examination::examine_lidar_rotation() {
   lidar_.offset = fit.offset;
   lidar_.error = (fit.R * described.inverse()).matrix();
   lidar_offset_ = fit.offset;
-  constexpr double method = 0.05;  // degrees: the gyro's own misalignment is taken for the mount's
+  constexpr double method = 0.1;  // degrees: the gyro's own misalignment is taken for the mount's
   refine_rotation(Sensor::lidar, "rotation of the LiDAR on the IMU", described, fit.R, fit.rotation_sigma(), method, "lidar.T_imu_lidar.R");
   const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
   const double angle = degrees(turn.norm());

@@ -20,12 +20,16 @@ struct SweepPose {
   bool good = false;
 };
 
-/// What is known of the turning within a sweep.
+class LidarWay;
+
+/// What is known of the motion within a sweep: its turning by the gyro and, from a way that was found before, how the velocity changes.
 struct Deskew {
   const GyroPath* gyro = nullptr;
   SO3 R_IL;
-  double offset = 0;      // s: the LiDAR's stamps plus this are on the IMU's clock
-  bool reversed = false;  // hypothesis: the points' times run backwards within a sweep
+  double offset = 0;              // s: the LiDAR's stamps plus this are on the IMU's clock
+  bool reversed = false;          // hypothesis: the points' times run backwards within a sweep
+  const LidarWay* way = nullptr;  // none: constant velocity within a sweep
+  Eigen::Vector3d p_IL = Eigen::Vector3d::Zero();
 };
 
 struct OdometryRange {

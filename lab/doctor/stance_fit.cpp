@@ -12,12 +12,13 @@ namespace {
 constexpr double period = 0.019;  // s between samples
 // m/s, rad/s, of a sole that stands: as far as it is known before and after the first fit. Soles that roll seem to stand, too.
 constexpr double still[] = {0.15, 0.06}, still_turn[] = {0.45, 0.2};
-constexpr std::size_t shortest = 8;               // samples of a stance
-constexpr std::size_t edge = 2;                   // samples at either end, where soles roll
-constexpr std::size_t fewest = 24;                // stances
-constexpr double slack = 0.02;                    // s
-constexpr double unit_p = 0.003, unit_R = 0.006;  // m, rad: of the rows
-constexpr double nudge = 1e-3;                    // rad
+constexpr std::size_t shortest = 8;  // samples of a stance
+constexpr std::size_t edge = 2;      // samples at either end, where soles roll
+constexpr std::size_t fewest = 24;   // stances
+constexpr double slack = 0.02;       // s
+// m, rad: of the rows. A sole tilts with the load on it by a tenth of a degree, in step with the gait, while its middle stays where it is.
+constexpr double unit_p = 0.003, unit_R = 0.03;
+constexpr double nudge = 1e-3;  // rad
 // What a careful description leaves: of positions, zeros of encoders and lengths.
 constexpr double prior_p = 0.01, prior_zero = 0.004, prior_scale = 0.005;  // m, rad, -
 constexpr int passes = 3;
@@ -48,8 +49,9 @@ Eigen::Vector3d middle_of(const FootPose& foot) {
 class Stances {
  public:
   Stances(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
-          double offset)
-      : way_(way), gyro_(gyro), T_LI_(robot.imu.T_link_imu), offset_(offset), joints_(joints_that_matter(recorded, robot)) {
+          double offset, bool with_zeros)
+      : way_(way), gyro_(gyro), T_LI_(robot.imu.T_link_imu), offset_(offset) {
+    if (with_zeros) joints_ = joints_that_matter(recorded, robot);
     const std::vector<LegPose> path = leg_path(recorded, robot, hypothesis, period, nullptr);
     const auto n = static_cast<Eigen::Index>(joints_.size());
     for (const LegPose& pose : path) {
@@ -65,6 +67,21 @@ class Stances {
   Eigen::Index unknowns() const { return of_zeros + static_cast<Eigen::Index>(joints_.size()); }
   const std::vector<std::size_t>& joints() const { return joints_; }
   std::size_t stances() const { return stances_.size(); }
+  /// Samples of a stance say much the same: about two of them are worth something of their own, in the mean.
+  double repeated() const {
+    double samples = 0;
+    for (const Stance& s : stances_) samples += static_cast<double>(s.end - s.begin);
+    return std::max(1.0, samples / (2 * static_cast<double>(stances_.size())));
+  }
+
+  std::array<double, 2> standing() {
+    find(Eigen::VectorXd::Zero(unknowns()), false);
+    std::array<double, 2> out{};
+    for (const Stance& s : stances_) {
+      for (std::size_t i = s.begin + 1; i < s.end; ++i) out[s.foot] += moves(i) ? samples_[i].t - samples_[i - 1].t : 0;
+    }
+    return out;
+  }
 
   /// Where the soles seem to stand with these values.
   void find(const Eigen::VectorXd& x, bool first) {
@@ -115,6 +132,14 @@ class Stances {
   SO3 rotation(const Eigen::VectorXd& x) const { return SO3::Exp(x.head<3>()) * T_LI_.R; }
 
  private:
+  // A robot that stands still stands with any legs.
+  bool moves(std::size_t i) const {
+    constexpr double slow = 0.05;  // m/s
+    const double t = samples_[i].t + offset_;
+    const auto a = way_.at(t - slack, gyro_), b = way_.at(t + slack, gyro_);
+    return a && b && (b->p - a->p).norm() > slow * 2 * slack;
+  }
+
   void differentiate(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, Eigen::Index j) {
     LegHypothesis h = hypothesis != nullptr ? *hypothesis : LegHypothesis{};
     const std::size_t joint = joints_[static_cast<std::size_t>(j)];
@@ -160,7 +185,7 @@ class Stances {
 StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
                       const GyroPath& gyro, double offset) {
   StanceFit out;
-  Stances stances(recorded, robot, hypothesis, way, gyro, offset);
+  Stances stances(recorded, robot, hypothesis, way, gyro, offset, true);
   const Eigen::Index n = stances.unknowns();
   Eigen::VectorXd x = Eigen::VectorXd::Zero(n), prior = Eigen::VectorXd::Constant(n, prior_zero), step(n);
   prior.head<3>().setConstant(INFINITY);
@@ -175,7 +200,7 @@ StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHyp
     stances.find(x, k == 0);
     if (stances.stances() < fewest) return out;
     const auto rows = [&stances](const Eigen::VectorXd& at, Residuals& r) { stances.rows(at, r); };
-    fit = robust_fit(rows, none, prior, step, 8);
+    fit = robust_fit(rows, none, prior / std::sqrt(stances.repeated()), step, 8);
     if (!fit.good) return out;
     x = fit.x;
   }
@@ -195,6 +220,11 @@ StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHyp
   out.moved = fit.scale * unit_p;
   out.stances = stances.stances();
   return out;
+}
+
+std::array<double, 2> standing_time(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+                                    const GyroPath& gyro, double offset) {
+  return Stances(recorded, robot, hypothesis, way, gyro, offset, false).standing();
 }
 
 }  // namespace kilvo::lab

@@ -27,4 +27,8 @@ struct StanceFit {
 StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
                       const GyroPath& gyro, double offset);
 
+/// s, by foot, in which a sole stands while the robot moves. Legs that are described wrongly hardly ever stand.
+std::array<double, 2> standing_time(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+                                    const GyroPath& gyro, double offset);
+
 }  // namespace kilvo::lab
