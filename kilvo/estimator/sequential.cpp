@@ -18,9 +18,8 @@ std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE
   return out;
 }
 
-// Offsets of a clock below these are of no consequence, or a model's error; once there is one, it is found as exactly as the data allows,
-// s.
-double least_offset(bool is_shifted) { return is_shifted ? 5e-4 : 2e-3; }
+// An offset of the LiDAR's clock below this is of no consequence, s.
+constexpr double least_offset = 5e-4;
 
 }  // namespace
 
@@ -62,8 +61,7 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
 
   const SE3 T_WI = history_.now().x.pose();
   if (good) {
-    const auto clock =
-        lidar_.check_clock(prior, sweep.posterior, history_.trajectory(), begin, end, least_offset(input_.is_shifted(Sensor::lidar)));
+    const auto clock = lidar_.check_clock(prior, sweep.posterior, history_.trajectory(), begin, end, least_offset);
     if (clock.doubtful && vision_) vision_->restart_mount_check();  // it may see nothing but this
     if (clock.offset)
       findings_.report_clock_offset(situation(), Sensor::lidar, input_.shift_by(Sensor::lidar, *clock.offset), robot_.lidar.time_offset);
@@ -144,7 +142,7 @@ void Estimator::process(const CameraImage& image) {
   map_.held_against(seen.posterior.x.pose(), seen.drift, context.unobservable);
   Output result;
   result.coloured = vision_->learn(map_.surfaces(), map_.error().total(seen.T_WI, seen.posterior.P.topLeftCorner<6, 6>()));
-  if (const auto offset = vision_->clock_offset(least_offset(input_.is_shifted(Sensor::camera))))
+  if (const auto offset = vision_->clock_offset())
     findings_.report_clock_offset(situation(), Sensor::camera, input_.shift_by(Sensor::camera, *offset), robot_.camera.time_offset);
   if (seen.carries) status_.image_used(image.t);
   result.indicators = indicators_of(seen.used);

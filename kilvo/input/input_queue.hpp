@@ -42,8 +42,6 @@ class InputQueue {
   /// The clock of a camera or a LiDAR was found to be off the IMU's: from now on its stamps are later by so much more. Returns by how much
   /// they are later in all, s, which is bounded.
   double shift_by(Sensor s, double by);
-  /// The stamps of this sensor have been found to be off before.
-  bool is_shifted(Sensor s) const { return shift_[static_cast<std::size_t>(s)] != Duration(0); }
 
   bool uses(Sensor s) const { return used_[static_cast<std::size_t>(s)]; }
   const std::array<bool, sensor_count>& used() const { return used_; }

@@ -75,6 +75,7 @@ VisualPipeline::VisualPipeline(const CameraMount& mount, const VisionConfig& con
       camera_(mount),
       T_CI_(mount.T_imu_camera.inverse()),
       map_(map) {}
+
 VisualPipeline::VisualPipeline(VisualPipeline&&) noexcept = default;
 VisualPipeline& VisualPipeline::operator=(VisualPipeline&&) noexcept = default;
 VisualPipeline::~VisualPipeline() = default;
@@ -82,8 +83,8 @@ VisualPipeline::~VisualPipeline() = default;
 std::optional<VisualPipeline::Fault> VisualPipeline::fault_of(const CameraImage& image) {
   const Image& picture = image.image;
   if (picture.width != mount_.width || picture.height != mount_.height) {
-    const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
     if (std::exchange(size_is_reported_, true)) return Fault{Reason::image_size, {}};
+    const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
     return Fault{Reason::image_size, size(picture.width, picture.height) + " pixels cannot be used: camera.width and camera.height say " +
                                          size(mount_.width, mount_.height)};
   }
@@ -150,13 +151,17 @@ void VisualPipeline::adapt_exposure(Work& work) const {
   prior.P(at::tau, at::tau) = unsure * unsure;
 }
 
-Estimate VisualPipeline::update_by(Work& work) const {
+Estimate VisualPipeline::update_by(Work& work) {
   if (work.tracks.empty()) return work.prior;
   UpdateConfig config = update_;
   config.min_iterations = work.model.iterations();
   config.max_iterations = std::max(config.max_iterations, work.model.iterations() + 2);
+  bool first = true;
   const auto measured = [&](const State& x, const Covariance& P) {
     Information<7> info = work.model(x, P);
+    if (std::exchange(first, false) && work.model.report().used >= enough) excess_.add(normalised_innovation(info, P));
+    info.A /= excess_.variance();
+    info.b /= excess_.variance();
     if (work.context.feet_hold) {
       Eigen::Matrix<double, 7, 7> common = Eigen::Matrix<double, 7, 7>::Zero();
       common.topLeftCorner<6, 6>() = doubt_of_way(work, x.pose());
@@ -207,10 +212,8 @@ PoseCovariance VisualPipeline::doubt_of_way(const Work& work, const SE3& T_WI) c
 
 std::vector<EarlierView> VisualPipeline::drift_of(const Work& work, const SE3& T_WI) const {
   std::vector<EarlierView> out;
-  for (const auto& [frame, weight] : work.model.by_frame()) {
-    const VisualFrame& from = map_.frame(frame);
-    out.push_back({from.error, (T_WI.p - position_of(from)).norm(), weight});
-  }
+  for (const auto& [frame, weight] : work.model.by_frame())
+    out.push_back({map_.frame(frame).error, (T_WI.p - position_of(map_.frame(frame))).norm(), weight});
   return out;
 }
 
@@ -257,10 +260,8 @@ std::vector<ColouredPoint> VisualPipeline::learn(const VoxelMap& map, const Pose
   map_.forget_unused_frame(id);
   map_.forget(posterior.x.p, map_radius_);
   last_p_ = posterior.x.p;
-  std::vector<ColouredPoint> colours =
-      colours_of(work.image.image, posterior.x.tau, camera_, work.T_CI * posterior.x.pose().inverse(), work.depth);
-  work_.reset();
-  return colours;
+  const std::unique_ptr<Work> done = std::move(work_);
+  return colours_of(work.image.image, posterior.x.tau, camera_, work.T_CI * posterior.x.pose().inverse(), work.depth);
 }
 
 void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const SE3& T_CW, std::uint32_t frame) {
@@ -285,11 +286,10 @@ void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const S
   }
 }
 
-std::optional<double> VisualPipeline::clock_offset(double least) {
+std::optional<double> VisualPipeline::clock_offset() {
+  constexpr double least = 5e-4;  // s
   const auto offset = mount_check_.time_offset(least);
-  if (!offset) return std::nullopt;
-  restart_mount_check();
-  forget_map();
+  if (offset) restart_mount_check(), forget_map();
   return offset;
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "kilvo/filter/innovation.hpp"
 #include "kilvo/filter/pose_error.hpp"
 #include "kilvo/filter/state.hpp"
 #include "kilvo/filter/update_config.hpp"
@@ -74,9 +75,8 @@ class VisualPipeline {
   /// of the map around it, as a twist at the world's origin. Returns the points of the sweep that the image shows, coloured.
   std::vector<ColouredPoint> learn(const VoxelMap& map, const PoseCovariance& error);
 
-  /// s, to be added to the stamps of the images, if they are sure to be off by more than `least`. What was seen by the clock as it was is
-  /// forgotten then.
-  std::optional<double> clock_offset(double least);
+  /// s, to be added to the stamps of the images, if they are sure to be off. What was seen by the clock as it was is forgotten then.
+  std::optional<double> clock_offset();
   /// The LiDAR's clock may be off: what the images say of the mount may be that.
   void restart_mount_check();
   /// The map begins anew.
@@ -86,7 +86,7 @@ class VisualPipeline {
   struct Work;  // of the image that is registered
   bool is_lost_among_patches(const ImageContext& context) const;
   void adapt_exposure(Work& work) const;
-  Estimate update_by(Work& work) const;
+  Estimate update_by(Work& work);
   bool says_nothing(const Work& work);
   std::optional<Eigen::Vector3d> check_mount(const Work& work);
   PoseCovariance doubt_of_way(const Work& work, const SE3& T_WI) const;
@@ -103,6 +103,7 @@ class VisualPipeline {
   SE3 T_CI_;
   VisualMap map_;
   MountCheck mount_check_;
+  InnovationScale excess_;  // what images say too much: their calibration is wrong
   Time begins_at_{}, doubted_until_{};
   Duration pause_{};                                  // after the mount was doubted the last time
   int in_vain_ = 0;                                   // images in a row in which hardly any patch was found

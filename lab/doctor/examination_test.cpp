@@ -13,6 +13,7 @@
 namespace kilvo::lab {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
@@ -98,6 +99,14 @@ TEST(Doctor, TheImuIsNamedWhenAllOthersDisagreeWithIt) {
   recorded = walked().recorded;
   for (InertialSample& s : recorded.imu) s.gyro *= 57.29577951308232;
   EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("gyro_unit"));
+}
+
+TEST(Doctor, OnTheLegsAloneOnlyAGyroOfTheOtherHandIsAccused) {
+  Recorded recorded = walked().recorded;
+  recorded.sweeps.clear();
+  EXPECT_THAT(causes(recorded, walked().robot), IsEmpty());
+  for (InertialSample& s : recorded.imu) s.gyro.y() *= -1;
+  EXPECT_THAT(causes(recorded, walked().robot), Contains("imu_axes"));
 }
 
 TEST(Doctor, LegsAreNamedWithTheJoint) {
