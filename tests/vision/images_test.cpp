@@ -111,7 +111,8 @@ TEST_F(Images, OfAClockThatIsOffAreShifted) {
     i.t += std::chrono::milliseconds(15);
     return true;
   });
-  EXPECT_NEAR(late.statistics.clock_shift[camera], -0.015, 0.004) << "of small images, after ten seconds";
+  // Two thirds of it after ten seconds of small images; what is left is found later.
+  EXPECT_NEAR(late.statistics.clock_shift[camera], -0.015, 0.005);
   EXPECT_THAT(warnings_of(late.statistics), testing::Contains(HasSubstr("set camera.time_offset to")));
   EXPECT_EQ(drive(liv).statistics.clock_shift[camera], 0);
 }
