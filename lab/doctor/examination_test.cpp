@@ -104,7 +104,7 @@ TEST(Doctor, TheImuIsNamedWhenAllOthersDisagreeWithIt) {
 TEST(Doctor, OnTheLegsAloneOnlyAGyroOfTheOtherHandIsAccused) {
   Recorded recorded = walked().recorded;
   recorded.sweeps.clear();
-  EXPECT_THAT(causes(recorded, walked().robot), IsEmpty());
+  for (const std::string& cause : causes(recorded, walked().robot)) EXPECT_FALSE(cause.starts_with("imu")) << cause;
   for (InertialSample& s : recorded.imu) s.gyro.y() *= -1;
   EXPECT_THAT(causes(recorded, walked().robot), Contains("imu_axes"));
 }
