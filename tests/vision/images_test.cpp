@@ -186,8 +186,8 @@ TEST_F(Images, ACameraTurnedByThreeDegreesIsSpokenOf) {
   }
 }
 
-// A camera that is described wrongly carries nothing once the robot walks. While it stands (the first third), patches fit at the wrong place
-// as well.
+// A camera that is described wrongly carries nothing once the robot walks. While it stands (the first third), patches fit at the wrong
+// place as well.
 TEST_F(Images, OfAWronglyDescribedCameraCarryNothing) {
   const std::vector<std::pair<const char*, std::function<void(Robot&)>>> wrong = {
       {"cx and cy swapped", [](Robot& r) { std::swap(r.camera.cx, r.camera.cy); }},
