@@ -75,7 +75,6 @@ VisualPipeline::VisualPipeline(const CameraMount& mount, const VisionConfig& con
       camera_(mount),
       T_CI_(mount.T_imu_camera.inverse()),
       map_(map) {}
-
 VisualPipeline::VisualPipeline(VisualPipeline&&) noexcept = default;
 VisualPipeline& VisualPipeline::operator=(VisualPipeline&&) noexcept = default;
 VisualPipeline::~VisualPipeline() = default;
@@ -156,8 +155,7 @@ Estimate VisualPipeline::update_by(Work& work) {
   UpdateConfig config = update_;
   config.min_iterations = work.model.iterations();
   config.max_iterations = std::max(config.max_iterations, work.model.iterations() + 2);
-  bool first = true;
-  const auto measured = [&](const State& x, const Covariance& P) {
+  auto measured = [&, first = true](const State& x, const Covariance& P) mutable {
     Information<7> info = work.model(x, P);
     if (std::exchange(first, false) && work.model.report().used >= enough) excess_.add(normalised_innovation(info, P));
     info.A /= excess_.variance();
@@ -289,7 +287,9 @@ void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const S
 std::optional<double> VisualPipeline::clock_offset() {
   constexpr double least = 5e-4;  // s
   const auto offset = mount_check_.time_offset(least);
-  if (offset) restart_mount_check(), forget_map();
+  if (!offset) return std::nullopt;
+  restart_mount_check();
+  forget_map();
   return offset;
 }
 
