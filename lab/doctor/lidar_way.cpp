@@ -22,26 +22,36 @@ Eigen::Vector3d accel_at(double t, std::vector<InertialSample>::const_iterator i
   return (1 - share) * before->accel + share * it->accel;
 }
 
+/// Double integration from `a` to `b`, s, of a body that is at rest in `from` at the beginning; `step(t, place, velocity)` after each
+/// sample.
+template <class Step>
+void integrate(double a, double b, const SE3& from, const std::vector<InertialSample>& imu, const GyroPath& gyro,
+               const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba, Step&& step) {
+  Eigen::Vector3d p = from.p, v = Eigen::Vector3d::Zero();
+  auto it = std::ranges::lower_bound(imu, a, {}, &InertialSample::t);
+  for (double t = a; t < b && it != imu.end(); ++it) {
+    const double next = std::min(it->t, b), dt = next - t;
+    if (!(dt > 0)) continue;
+    const SO3 R = from.R * SO3::from_quaternion(gyro.between(a, 0.5 * (t + next)));
+    const Eigen::Vector3d force = R * Eigen::Vector3d(accel_at(0.5 * (t + next), it, imu) - ba) + g_W;
+    p = p + dt * v + 0.5 * dt * dt * force;
+    v += dt * force;
+    step(next, p, v);
+    t = next;
+  }
+}
+
 /// What the IMU says of the motion from one sweep to the next: place and velocity gained by a body that was at rest.
 struct Increment {
-  double dt = 0;
   Eigen::Vector3d dp = Eigen::Vector3d::Zero(), dv = Eigen::Vector3d::Zero();
 };
 
 Increment increment(double a, double b, const SO3& R_a, const std::vector<InertialSample>& imu, const GyroPath& gyro,
                     const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
-  Increment out{b - a, {}, {}};
-  out.dp.setZero(), out.dv.setZero();
-  auto it = std::ranges::lower_bound(imu, a, {}, &InertialSample::t);
-  for (double t = a; t < b && it != imu.end(); ++it) {
-    const double next = std::min(it->t, b), dt = next - t;
-    if (!(dt > 0)) continue;
-    const SO3 R = R_a * SO3::from_quaternion(gyro.between(a, 0.5 * (t + next)));
-    const Eigen::Vector3d force = R * Eigen::Vector3d(accel_at(0.5 * (t + next), it, imu) - ba) + g_W;
-    out.dp += dt * out.dv + 0.5 * dt * dt * force;
-    out.dv += dt * force;
-    t = next;
-  }
+  Increment out;
+  integrate(a, b, SE3{R_a, Eigen::Vector3d::Zero()}, imu, gyro, g_W, ba, [&](double, const Eigen::Vector3d& p, const Eigen::Vector3d& v) {
+    out = {p, v};
+  });
   return out;
 }
 
@@ -177,18 +187,9 @@ void LidarWay::bridge(const Pose& a, const Pose& b, const std::vector<InertialSa
                       const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
   if (!gyro.covers(a.t, b.t)) return;
   std::vector<Pose> steps{a};
-  Eigen::Vector3d v = Eigen::Vector3d::Zero();
-  auto it = std::ranges::lower_bound(imu, a.t, {}, &InertialSample::t);
-  for (double t = a.t; t < b.t && it != imu.end(); ++it) {
-    const double next = std::min(it->t, b.t), dt = next - t;
-    if (!(dt > 0)) continue;
-    const SO3 R = a.T_WI.R * SO3::from_quaternion(gyro.between(a.t, 0.5 * (t + next)));
-    const Eigen::Vector3d force = R * Eigen::Vector3d(accel_at(0.5 * (t + next), it, imu) - ba) + g_W;
-    Pose pose{next, {a.T_WI.R * SO3::from_quaternion(gyro.between(a.t, next)), steps.back().T_WI.p + dt * v + 0.5 * dt * dt * force}};
-    v += dt * force;
-    steps.push_back(pose);
-    t = next;
-  }
+  integrate(a.t, b.t, a.T_WI, imu, gyro, g_W, ba, [&](double t, const Eigen::Vector3d& p, const Eigen::Vector3d&) {
+    steps.push_back({t, {a.T_WI.R * SO3::from_quaternion(gyro.between(a.t, t)), p}});
+  });
   const double span = steps.back().t - a.t;
   if (!(span > 0) || b.t - steps.back().t > 0.05) return;
   const Eigen::Vector3d missing = (b.T_WI.p - steps.back().T_WI.p) / span;
