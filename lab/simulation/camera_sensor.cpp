@@ -137,36 +137,54 @@ void CameraSensor::add_light(const SE3& T_WC, int first_row, int last_row, std::
   }
 }
 
-// Grey levels of the pixels from `first` on.
-void CameraSensor::expose(std::int64_t index, float brightness, std::size_t first, const std::vector<Colour>& light, Image& out) const {
+// Grey levels of the pixels from `first` on. `brightness`: of full reflectance, by colour.
+void CameraSensor::expose(std::int64_t index, const Colour& brightness, std::size_t first, const std::vector<Colour>& light,
+                          Image& out) const {
   const CameraModel& m = config_.camera;
+  const auto& errors = config_.errors.camera;
   const auto read = static_cast<float>(m.read_noise * m.read_noise), photon = static_cast<float>(m.photon_noise);
+  const Eigen::Vector2d middle(m.cx, m.cy);
   for (std::size_t k = 0; k < light.size(); ++k) {
-    const std::size_t i = first + k;
+    const std::size_t i = first + k, width = static_cast<std::size_t>(m.width);
+    const Eigen::Vector2d pixel(static_cast<double>(i % width), static_cast<double>(i / width));
+    const float shade = errors ? errors->shade((pixel - middle).squaredNorm() / middle.squaredNorm()) : 1;
     std::uint64_t bits = Random(config_.seed, stream + 1, static_cast<std::uint64_t>(index) * 10'000'019 + i).bits();
     for (std::size_t c = 0; c < 3; ++c, bits >>= 12) {
-      const float grey = brightness * light[k][static_cast<int>(c)];
-      const float noisy = grey + std::sqrt(read + photon * grey) * gaussian_[bits % draws];
+      const float grey = shade * brightness[static_cast<int>(c)] * light[k][static_cast<int>(c)];
+      const float linear = grey + std::sqrt(read + photon * grey) * gaussian_[bits % draws];
+      const float noisy = errors ? errors->response(linear) : linear;
       out.pixels[3 * i + c] = static_cast<std::uint8_t>(std::clamp(noisy + 0.5F, 0.0F, 255.0F));
     }
   }
 }
 
+// How many looks within the exposure it takes for what the image turns by.
+int CameraSensor::samples_of(double t, double exposure, const std::function<SE3(double)>& torso_at) const {
+  const CameraModel& m = config_.camera;
+  if (m.pixels_per_sample <= 0) return std::max(1, m.blur_samples);
+  const double angle = (torso_at(t - exposure / 2).R.inverse() * torso_at(t + exposure / 2).R).Log().norm();
+  return 1 + static_cast<int>(std::min(7.0, angle * m.fx / m.pixels_per_sample));
+}
+
 Image CameraSensor::image(std::int64_t index, double t, const std::function<SE3(double)>& torso_at, const Workers& workers) const {
   const CameraModel& m = config_.camera;
-  const double exposure = exposure_at(m, t);
-  const int samples = std::max(1, m.blur_samples);
-  std::vector<SE3> poses;
-  poses.reserve(static_cast<std::size_t>(samples));
-  for (int k = 0; k < samples; ++k) poses.push_back(torso_at(t + exposure * ((k + 0.5) / samples - 0.5)) * m.T_torso_camera);
-  const auto brightness = static_cast<float>(255 * exposure * m.gain / samples);
+  const auto& errors = config_.errors.camera;
+  const double exposure = exposure_at(m, t), readout = errors ? errors->readout : 0;
+  const int samples = samples_of(t, exposure, torso_at);
+  Colour brightness = Colour::Constant(static_cast<float>(255 * exposure * m.gain / samples));
+  if (errors) brightness = brightness.cwiseProduct(Eigen::Map<const Colour>(errors->tint(t).data()));
   const auto width = static_cast<std::size_t>(m.width), height = static_cast<std::size_t>(m.height);
 
   Image out{m.width, m.height, 3, std::vector<std::uint8_t>(width * height * 3)};
-  constexpr std::size_t rows = 48;
+  // Rows that are read out after each other are seen from one place each few of them: 0.1 ms, some hundredths of a pixel.
+  const std::size_t rows = readout > 0 ? 4 : 48;
   workers.sum(height, rows, NoSum{}, [&](std::size_t first, std::size_t last) {
+    const double middle = t + readout * (static_cast<double>(first + last) / 2 / m.height - 0.5);
     std::vector<Colour> light((last - first) * width, Colour::Zero());
-    for (const SE3& T : poses) add_light(T, static_cast<int>(first), static_cast<int>(last), light);
+    for (int k = 0; k < samples; ++k) {
+      const SE3 T_WC = torso_at(middle + exposure * ((k + 0.5) / samples - 0.5)) * m.T_torso_camera;
+      add_light(T_WC, static_cast<int>(first), static_cast<int>(last), light);
+    }
     expose(index, brightness, first * width, light, out);
     return NoSum{};
   });

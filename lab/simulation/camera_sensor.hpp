@@ -30,7 +30,8 @@ class CameraSensor {
   PixelRay ray_of(int u, int v, const SO3& R_WC) const;
   void add_light(const SE3& T_WC, int first_row, int last_row, std::vector<Colour>& light) const;
   Colour light_of_edge(const Eigen::Vector3d& origin, const PixelRay& ray) const;
-  void expose(std::int64_t index, float brightness, std::size_t first, const std::vector<Colour>& light, Image& out) const;
+  int samples_of(double t, double exposure, const std::function<SE3(double)>& torso_at) const;
+  void expose(std::int64_t index, const Colour& brightness, std::size_t first, const std::vector<Colour>& light, Image& out) const;
 
   const SimulatorConfig& config_;
   const World& world_;

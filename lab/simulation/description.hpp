@@ -12,7 +12,7 @@ namespace kilvo::lab {
 /// By Sensor.
 std::array<std::string, sensor_count> simulated_topics();
 
-/// A configuration file (YAML) for recordings of this robot. `urdf`: path of the URDF, relative to the file.
+/// A configuration file (YAML) for recordings of this robot, with what its clocks are off. `urdf`: path of the URDF, relative to the file.
 std::string simulated_config(const SimulatorConfig& config, const std::string& urdf);
 
 }  // namespace kilvo::lab

@@ -65,26 +65,57 @@ LidarSensor::LidarSensor(const SimulatorConfig& config, const World& world, doub
       max_range_(range_limit > 0 ? std::min(range_limit, config.lidar.max_range) : config.lidar.max_range),
       phase_(Random(config.seed, stream).uniform(0, 2 * pi)) {}
 
+// What sends enough light back to be seen.
+std::optional<Hit> LidarSensor::echo(const Ray& ray) const {
+  const auto hit = world_.cast(ray.from, ray.way);
+  if (!hit || hit->cosine < config_.lidar.least_cosine || hit->range < config_.lidar.min_range) return std::nullopt;
+  // The echo of a darker or grazed surface is lost earlier: its power falls with the square of the range.
+  if (hit->range > max_range_ * std::min(1.0, std::sqrt(world_.reflectivity(*hit) * hit->cosine / 0.1))) return std::nullopt;
+  return hit;
+}
+
+// As it is measured, m; 0: not at all. `noise`: a Gaussian draw.
+double LidarSensor::range_of(const Ray& ray, const Hit& hit, double noise) const {
+  const auto& errors = config_.errors.lidar;
+  if (!errors) return hit.range + config_.lidar.range_noise * noise;
+  Random random(config_.seed, stream + 2, ray.name);
+  if (random.uniform() < errors->dropout) return 0;
+  const double aside = errors->footprint / 2;
+  const Eigen::Vector3d within(random.uniform(-aside, aside), random.uniform(-aside, aside), random.uniform(-aside, aside));
+  double range = hit.range;
+  const auto beside = world_.cast(ray.from, (ray.way + within).normalized());
+  constexpr double apart = 0.1;  // m: surfaces that are farther from each other than a pulse is long
+  if (beside && std::abs(beside->range - hit.range) > apart && random.uniform() < errors->mixed)
+    range += random.uniform() * (beside->range - hit.range);
+  constexpr double outlier = 5;
+  const double sigma = errors->sigma(hit.cosine, hit.range) * (random.uniform() < errors->tail ? outlier : 1);
+  return range + errors->bias(hit.cosine, world_.surfaces()[hit.surface].material) + sigma * noise;
+}
+
 LidarScan LidarSensor::scan(std::int64_t index, double begin, const std::function<SE3(double)>& torso_at, const Workers& workers) const {
   const LidarModel& model = config_.lidar;
   const double interval = 1 / model.delivery.rate / model.points;
   std::vector<LidarPoint> points(static_cast<std::size_t>(model.points));  // at the origin: no echo
   const SE3& T_TL = config_.shape.T_torso_lidar;
+  const auto& errors = config_.errors.lidar;
   const auto cast = [&](std::size_t i, const std::array<SE3, 2>& ends, double share) {
     const double offset = interval * static_cast<double>(i);
     const Eigen::Vector3d direction = ray_direction(model, static_cast<int>(i), begin + offset, phase_);
+    points[i].offset_ns = static_cast<std::int32_t>(std::llround(offset * 1e9));
+    const auto put = [&](const Eigen::Vector3f& p, double intensity) {
+      points[i] = {p.x(), p.y(), p.z(), std::round(static_cast<float>(intensity)), points[i].offset_ns};
+    };
+    if (const auto arm = errors ? errors->arm(direction, begin + offset) : std::nullopt) return put((*arm * direction).cast<float>(), 60);
     if (hits_own_body(T_TL.p, T_TL.R * direction)) return;
     const Eigen::Vector3d from = ends[0].p + share * (ends[1].p - ends[0].p), way = ends[0].R * direction;
-    const auto hit = world_.cast(from, (way + share * (ends[1].R * direction - way)).normalized());
-    if (!hit || hit->cosine < model.least_cosine || hit->range < model.min_range) return;
-    // The echo of a darker or grazed surface is lost earlier: its power falls with the square of the range.
-    if (hit->range > max_range_ * std::min(1.0, std::sqrt(world_.reflectivity(*hit) * hit->cosine / 0.1))) return;
-    Random random(config_.seed, stream + 1, static_cast<std::uint64_t>(index) * 1'000'003 + i);
-    const double range = hit->range + model.range_noise * random.gaussian();
+    const Ray ray{from, (way + share * (ends[1].R * direction - way)).normalized(), static_cast<std::uint64_t>(index) * 1'000'003 + i};
+    const auto hit = echo(ray);
+    if (!hit) return;
+    Random random(config_.seed, stream + 1, ray.name);
+    const double range = range_of(ray, *hit, random.gaussian());
     const Eigen::Vector3d tilt = model.angle_noise * random.gaussian3();
-    const Eigen::Vector3f p = (range * (direction + tilt - tilt.dot(direction) * direction).normalized()).cast<float>();
-    const auto intensity = static_cast<float>(255 * world_.reflectivity(*hit) * std::sqrt(hit->cosine));
-    points[i] = {p.x(), p.y(), p.z(), std::round(intensity), static_cast<std::int32_t>(std::llround(offset * 1e9))};
+    put((range * (direction + tilt - tilt.dot(direction) * direction).normalized()).cast<float>(),
+        range > 0 ? 255 * world_.reflectivity(*hit) * std::sqrt(hit->cosine) : 0);
   };
   // Within a quarter of a millisecond the body moves straight, to less than a micrometre.
   constexpr std::size_t straight = 50;
@@ -97,7 +128,7 @@ LidarScan LidarSensor::scan(std::int64_t index, double begin, const std::functio
   LidarScan out;
   out.points.reserve(points.size());
   for (const LidarPoint& p : points) {
-    if (p.x != 0 || p.y != 0 || p.z != 0) out.points.push_back(p);
+    if (errors || p.x != 0 || p.y != 0 || p.z != 0) out.points.push_back(p);  // drivers leave those without echo at (0, 0, 0)
   }
   return out;
 }

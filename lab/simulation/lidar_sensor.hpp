@@ -24,6 +24,13 @@ class LidarSensor {
   LidarScan scan(std::int64_t index, double begin, const std::function<SE3(double)>& torso_at, const Workers& workers) const;
 
  private:
+  struct Ray {
+    Eigen::Vector3d from, way;  // in the world
+    std::uint64_t name;         // of what it draws
+  };
+  std::optional<Hit> echo(const Ray& ray) const;
+  double range_of(const Ray& ray, const Hit& hit, double noise) const;
+
   const SimulatorConfig& config_;
   const World& world_;
   double max_range_;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "lab/simulation/clutter.hpp"
 #include "lab/simulation/joint_effort.hpp"
 
 namespace kilvo::lab {
@@ -27,7 +28,7 @@ Simulator::Simulator(const Scenario& scenario, const SimulatorConfig& config)
     : config_(worn(config)),
       walk_(config_.shape, ground_of(scenario, config.seed), scenario.start, on_soft_soles(scenario.stages, config.wear)),
       wear_(config.wear, walk_, config.seed),
-      world_(make_scene(scenario.world, config.seed), config.seed),
+      world_(cluttered(make_scene(scenario.world, config.seed), walk_, config.errors.objects, config.seed), config.seed),
       lidar_(config_, world_, scenario.lidar_range),
       camera_(config_, world_),
       workers_(config.threads),
@@ -116,12 +117,19 @@ ImuSample Simulator::imu_at(double t) {
                 gyro_bias_,
                 accel_bias_,
                 walk_.velocity(t)};
+  Eigen::Vector3d gyro = imu_truth_.gyro, accel = imu_truth_.accel;
+  if (const auto& e = config_.errors.imu) {
+    imu_truth_.gyro_bias += e->warmth(t) * e->gyro_warming;
+    imu_truth_.accel_bias += e->warmth(t) * e->accel_warming;
+    gyro = e->gyro * imu_truth_.gyro + e->g_sensitivity * imu_truth_.accel;
+    accel = e->accel * imu_truth_.accel;
+  }
   const double root_rate = std::sqrt(m.delivery.rate);
   const auto clipped = [](const Eigen::Vector3d& v, double range) { return Eigen::Vector3d(v.cwiseMax(-range).cwiseMin(range)); };
   ImuSample out;
   out.t = stamp(Sensor::imu, t);
-  out.gyro = clipped(imu_truth_.gyro + gyro_bias_ + m.gyro_noise * root_rate * random.gaussian3(), m.gyro_range);
-  out.accel = clipped(imu_truth_.accel + accel_bias_ + m.accel_noise * root_rate * random.gaussian3(), m.accel_range);
+  out.gyro = clipped(gyro + imu_truth_.gyro_bias + m.gyro_noise * root_rate * random.gaussian3(), m.gyro_range);
+  out.accel = clipped(accel + imu_truth_.accel_bias + m.accel_noise * root_rate * random.gaussian3(), m.accel_range);
   gyro_bias_ += m.gyro_bias_walk / root_rate * random.gaussian3();
   accel_bias_ += m.accel_bias_walk / root_rate * random.gaussian3();
   return out;

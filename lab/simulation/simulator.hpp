@@ -48,6 +48,8 @@ class Simulator final : public MeasurementSource {
   double seconds_of(Time t) const { return to_seconds(t - start_); }
   /// The truth of the IMU sample that next() gave last.
   const ImuTruth& imu_truth() const { return imu_truth_; }
+  /// What each encoder shows more than the joint's angle, rad.
+  const JointAngles& joint_zeros() const { return joint_offsets_; }
 
  private:
   struct Due {

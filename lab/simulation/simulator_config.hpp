@@ -6,6 +6,7 @@
 
 #include "kilvo/sensors/measurement.hpp"
 #include "lab/simulation/biped.hpp"
+#include "lab/simulation/sensor_errors.hpp"
 #include "lab/simulation/wear_model.hpp"
 
 namespace kilvo::lab {
@@ -60,6 +61,7 @@ struct CameraModel {
   double exposure_period = 7;                   // s
   double read_noise = 1, photon_noise = 0.015;  // variance of a grey level I: read_noise^2 + photon_noise * I
   int blur_samples = 1;                         // within the exposure; 1: no motion blur
+  double pixels_per_sample = 0;                 // above 0: as many more as the image turns by so much within the exposure, 8 at the most
 
  private:
   static SE3 mount();
@@ -70,6 +72,7 @@ struct SimulatorConfig {
   double duration = 0;  // s; 0: until the walk ends
   BipedShape shape;     // as the URDF has it
   WearModel wear;
+  SensorErrors errors;
   ImuModel imu;
   JointModel joints;
   LidarModel lidar;

@@ -119,9 +119,11 @@ Eigen::Vector3d Wear::vibration(double t) const {
 
 Copies Wear::copies(Sensor sensor) {
   if (sensor != Sensor::imu && sensor != Sensor::legs) return Copies::one;
-  if (model_.lost == 0 && model_.repeated == 0) return Copies::one;
-  const double drawn = loss_[sensor == Sensor::imu ? 0 : 1].uniform();
-  return drawn < model_.lost ? Copies::none : drawn > 1 - model_.repeated ? Copies::two : Copies::one;
+  const bool legs = sensor == Sensor::legs;
+  const double lost = model_.lost + (legs ? model_.legs_lost : 0), repeated = model_.repeated + (legs ? model_.legs_repeated : 0);
+  if (lost == 0 && repeated == 0) return Copies::one;
+  const double drawn = loss_[legs ? 1 : 0].uniform();
+  return drawn < lost ? Copies::none : drawn > 1 - repeated ? Copies::two : Copies::one;
 }
 
 Time Wear::joint_stamp(Time ideal) {

@@ -15,7 +15,8 @@ struct WearModel {
   double stamp_jitter = 0;  // s: sigma of the joint stamps; they never go back
   double lost = 0;          // share of joint and IMU messages that do not come
   double repeated = 0;      // share of joint and IMU messages that come twice
-  double vibration = 0;     // m/s^2: rms of the torso's vibration on each axis while it walks, 45 to 90 Hz: a slow IMU aliases it
+  double legs_lost = 0, legs_repeated = 0;  // the same of joint messages alone, on top of that
+  double vibration = 0;  // m/s^2: rms of the torso's vibration on each axis while it walks, 45 to 90 Hz: a slow IMU aliases it
 };
 
 }  // namespace kilvo::lab
