@@ -5,6 +5,7 @@
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/simulation_folder.hpp"
 #include "apps/cli/verbs.hpp"
+#include "lab/simulation/rough.hpp"
 
 namespace kilvo::cli {
 namespace {
@@ -29,6 +30,10 @@ void add_simulate(CLI::App& program, Action& chosen) {
   verb->add_option("--duration", options->duration, "end after so many seconds; default: when the walk ends")->type_name("S");
   verb->add_option("--stride", options->stride, "every step so many times as long; default: 1")->type_name("X");
   add_wear_options(*verb, options->wear);
+  verb->add_option("--rough", options->rough, "a robot as it is, kept well (1) or badly (2); the description is the nominal one")
+      ->type_name("LEVEL")
+      ->check(CLI::Range(0, 2));
+  verb->add_option("--rough-only", options->rough_only, fmt::format("only these parts of that: {}", lab::names_of({})))->type_name("PARTS");
   verb->add_flag("--quiet", options->quiet, "no progress, only errors");
   verb->footer(list_of_scenarios());
   verb->callback([out, options, &chosen] { chosen = [out, options] { return simulate(*out, *options); }; });

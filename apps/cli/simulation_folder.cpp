@@ -11,6 +11,7 @@
 #include "lab/recordings/recording_writer.hpp"
 #include "lab/settings/nearest.hpp"
 #include "lab/simulation/description.hpp"
+#include "lab/simulation/rough_record.hpp"
 #include "lab/simulation/simulator.hpp"
 
 namespace kilvo::cli {
@@ -94,6 +95,36 @@ void write_recording(const fs::path& folder, lab::Simulator& simulator, Progress
   exposure.close();
 }
 
+lab::RoughParts parts_of(const SimulationOptions& options) {
+  if (options.rough < 0 || options.rough > 2) throw UsageError("--rough takes 0, 1 or 2");
+  if (options.rough == 0 && !options.rough_only.empty()) throw UsageError("--rough-only needs --rough 1 or 2");
+  try {
+    return lab::rough_parts(options.rough_only);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(fmt::format("--rough-only: {}", error.what()));
+  }
+}
+
+/// The robot, what its user knows of it, and the seed and the end of its walk.
+lab::RoughRobot robot_of(const lab::Scenario& scenario, const SimulationOptions& options) {
+  lab::SimulatorConfig config = lab::robot_of(scenario);
+  config.seed = static_cast<std::uint64_t>(options.seed);
+  config.duration = options.duration.value_or(0);
+  config.threads = 0;
+  lab::RoughRobot robot = lab::rough_robot(config, options.rough, parts_of(options));
+  apply(options.wear, robot.truth);
+  apply(options.wear, robot.known);
+  return robot;
+}
+
+void write_rough_truth(const fs::path& folder, const SimulationOptions& options, const lab::Simulator& simulator) {
+  lab::SimulatorConfig truth = simulator.config();
+  truth.shape = simulator.walk().shape();
+  write_text_file(folder / "truth.urdf", lab::urdf_of(truth.shape));
+  write_text_file(folder / "truth.yaml", lab::simulated_config(truth, "truth.urdf"));
+  write_text_file(folder / "rough.yaml", lab::rough_record(options.rough, parts_of(options), simulator));
+}
+
 }  // namespace
 
 std::string list_of_scenarios() {
@@ -109,17 +140,14 @@ double simulate_into(const fs::path& folder, const SimulationOptions& options) {
     throw UsageError(fmt::format("--duration must be above 0 and at most {} seconds", longest));
   }
   if (options.seed < 0) throw UsageError("--seed must be 0 or more");
-  lab::SimulatorConfig config = lab::robot_of(scenario);
-  apply(options.wear, config);
-  config.seed = static_cast<std::uint64_t>(options.seed);
-  config.duration = options.duration.value_or(0);
-  config.threads = 0;
+  const lab::RoughRobot robot = robot_of(scenario, options);
   try {
-    lab::Simulator simulator(scenario, config);
+    lab::Simulator simulator(scenario, robot.truth);
     prepare_folder(folder);
     Progress progress(Progress::style_for(options.quiet));
-    write_text_file(folder / "robot.urdf", lab::urdf_of(config.shape));
-    write_text_file(folder / "config.yaml", lab::simulated_config(config, "robot.urdf"));
+    write_text_file(folder / "robot.urdf", lab::urdf_of(robot.known.shape));
+    write_text_file(folder / "config.yaml", lab::simulated_config(robot.known, "robot.urdf"));
+    if (options.rough > 0) write_rough_truth(folder, options, simulator);
     write_walk(folder, simulator);
     write_recording(folder, simulator, progress);
     return simulator.duration();

@@ -17,10 +17,13 @@ struct SimulationOptions {
   bool quiet = false;              // no progress
   double stride = 1;               // every step so many times as long as in the scenario
   WearOptions wear{};              // beside that of the scenario
+  int rough = 0;                   // level of lab::rough_robot(); 0: the robot is as it is described
+  std::string rough_only{};        // parts of that, with commas between; empty: all
 };
 
-/// Writes recording.bag, gt.tum, contacts.gt.csv, imu_truth.csv, exposure.csv, robot.urdf and config.yaml into `folder`. Returns the
-/// seconds simulated. Throws UsageError for options that make no sense, lab::OutputError when the folder cannot be written.
+/// Writes recording.bag, gt.tum, contacts.gt.csv, imu_truth.csv, exposure.csv, robot.urdf and config.yaml into `folder`; of a rough robot
+/// also truth.yaml (config.yaml with the true values), its truth.urdf, and rough.yaml (what no setting says). Returns the seconds
+/// simulated. Throws UsageError for options that make no sense, lab::OutputError when the folder cannot be written.
 double simulate_into(const std::filesystem::path& folder, const SimulationOptions& options);
 
 /// One line for each scenario.

@@ -209,6 +209,34 @@ TEST(Simulate, AStepThatCannotBeReachedIsSaid) {
   EXPECT_EQ(kilvo({"simulate", "room", "--stride", "0.5", "--out", folder / "x", "--duration", "0.2"}).code, 0);
 }
 
+// What its user knows is the shipped robot; the truth is written beside it, in a form that can be run with.
+TEST(Simulate, ARoughRobotIsDescribedAsTheNominalOne) {
+  const Simulated walk;
+  std::vector<std::string> words = {"simulate", "room", "--rough", "2", "--rough-only", "imu,mount,time", "--duration", "0.3", "--out"};
+  words.push_back(walk.folder / "sim");
+  ASSERT_EQ(kilvo(words).code, 0);
+  walk.expect_the_shipped_robot();
+  EXPECT_EQ(kilvo({"config", "check", walk.file("truth.yaml")}).code, 0);
+  EXPECT_THAT(read_text(walk.file("truth.yaml")), AllOf(HasSubstr("urdf: truth.urdf"), HasSubstr("time_offset: -0.012\n")));
+  EXPECT_EQ(read_text(walk.file("truth.urdf")), read_text(walk.file("robot.urdf")));
+  EXPECT_THAT(read_text(walk.file("rough.yaml")), AllOf(HasSubstr("level: 2\nparts: [imu,mount,time]\n"), HasSubstr("g_sensitivity: [")));
+  words.back() = walk.folder / "again";
+  ASSERT_EQ(kilvo(words).code, 0);
+  for (const char* name : {"recording.bag", "truth.yaml", "rough.yaml", "gt.tum"})
+    EXPECT_TRUE(read_text(walk.file(name)) == read_text(walk.folder / ("again/" + std::string(name)))) << name;
+}
+
+TEST(Simulate, AnUnknownPartOfRoughnessIsSaid) {
+  const TemporaryFolder folder;
+  const Finished unknown = kilvo({"simulate", "room", "--rough", "1", "--rough-only", "imu,people", "--out", folder / "x"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("--rough-only: no part 'people'; there are lidar,scene,imu,legs,camera,mount,time"));
+  const Finished alone = kilvo({"simulate", "room", "--rough-only", "imu", "--out", folder / "x"});
+  EXPECT_EQ(alone.code, 2);
+  EXPECT_THAT(alone.err, HasSubstr("--rough-only needs --rough 1 or 2"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "x"));
+}
+
 TEST(Simulate, HelpListsTheScenarios) {
   const Finished f = kilvo({"simulate", "--help"});
   EXPECT_EQ(f.code, 0);
