@@ -77,6 +77,15 @@ inline RawMessage cloud_message(const LidarScan& scan) {
   return out.message();
 }
 
+inline RawMessage image_message(const CameraImage& s) {
+  CdrBuffer out;
+  const auto width = static_cast<std::uint32_t>(s.image.width), height = static_cast<std::uint32_t>(s.image.height);
+  put_header(out.cdr(), s.t, "camera");
+  out.cdr() << height << width << std::string(s.image.channels == 3 ? "rgb8" : "mono8") << std::uint8_t{0}
+            << width * static_cast<std::uint32_t>(s.image.channels) << s.image.pixels;
+  return out.message();
+}
+
 /// unitree_hg/LowState: the joints at the places of a G1 with 29, the pelvis' gyroscope, a counter and no checksum.
 inline RawMessage low_state_message(const JointSample& s, const Eigen::Vector3d& gyro, std::uint32_t tick) {
   static constexpr std::array<const char*, 13> places{

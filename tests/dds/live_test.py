@@ -138,6 +138,32 @@ class LiveTest(unittest.TestCase):
         self.assertGreater(heard["contacts"], 200, live.said())
         self.assertGreater(heard["odometry"], 300)
 
+    def test_e_images_services_and_the_record(self):
+        record, map_file = os.path.join(STORY.folder, "record.mcap"), os.path.join(STORY.folder, "map.ply")
+        live = Program(ARGUMENTS.kilvo, "live", "--config", os.path.join(STORY.walk, "config.yaml"), "--domain", STORY.domain, "--peer", "127.0.0.1",
+                       "--interface", "lo", "--set", f"live.map_file={map_file}", "--record", record)
+        self.assertTrue(wait_until(lambda: "odometry of" in live.said()), live.said())
+        player = STORY.play("--only", "imu,legs,lidar,camera")
+        self.assertTrue(wait_until(lambda: "KILV (" in live.said()), live.said())
+
+        def ask(*words: str) -> dict:
+            answer = json.loads(run(ARGUMENTS.peer, "call", STORY.domain, *words))
+            self.assertTrue(answer["success"], answer)
+            return answer
+
+        self.assertIn(map_file, ask("kilvo/save_map")["message"])
+        self.assertGreater(os.path.getsize(map_file), 10000)
+        ask("kilvo/pause/lidar", "1")
+        self.assertTrue(wait_until(lambda: "lidar is left out" in live.said()), live.said())
+        ask("kilvo/pause/lidar", "0")
+        ask("kilvo/reset")
+        self.assertTrue(wait_until(lambda: "kilvo: reset" in live.said()), live.said())
+        player.process.wait(60)
+        self.assertEqual(live.end(), 0, live.said())
+        info = run(ARGUMENTS.kilvo, "info", record)
+        for topic in ("/kilvo/odometry", "/kilvo/cloud", "/kilvo/cloud_coloured", "/kilvo/contacts", "/tf", "/diagnostics"):
+            self.assertRegex(info, topic + " .*_?msgs/")
+
     def test_d_what_cannot_be_is_refused(self):
         for words, text in ((("--interface", "no_such_interface"), "cannot be entered"), (("--set", "live.base=tail"), "nearest is")):
             program = Program(ARGUMENTS.kilvo, "live", "--config", STORY.config, "--domain", STORY.domain, *words)

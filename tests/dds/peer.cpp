@@ -1,7 +1,8 @@
 // The other side of `kilvo live` in tests: Fast DDS, which is another vendor's, plays a recording as a robot would, and listens.
 //
-//   peer play BAG DOMAIN [--legs lowstate] [--start S] [--seconds S] [--only imu,legs,lidar]
+//   peer play BAG DOMAIN [--legs lowstate] [--start S] [--seconds S] [--only imu,legs,lidar,camera]
 //   peer listen DOMAIN FILE.tum SECONDS     odometry into a file; at the end a line of JSON: how many of what
+//   peer call DOMAIN SERVICE [0|1]          asks a service as rmw_cyclonedds does (kilvo/save_map; kilvo/pause/lidar 1); its answer as JSON
 //   peer garbage DOMAIN SECONDS             bytes that are no Imu, on the IMU's topic
 //   peer wrong-type DOMAIN SECONDS          clouds of a type that the LiDAR's topic should not have
 //   peer picky DOMAIN SECONDS               a reader that asks for more durability than there is
@@ -113,11 +114,14 @@ class Player {
       legs_ = with_low_state_ ? peer_.writer("rt/lowstate", "unitree_hg::msg::dds_::LowState_", false)
                               : peer_.writer("rt/joint_states", "sensor_msgs::msg::dds_::JointState_", false);
     if (only.find("lidar") != std::string::npos) lidar_ = peer_.writer("rt/points", "sensor_msgs::msg::dds_::PointCloud2_", true);
+    if (only.find("camera") != std::string::npos) camera_ = peer_.writer("rt/camera/image_raw", "sensor_msgs::msg::dds_::Image_", true);
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
   }
 
   void play() {
     const Time began = wall_now();
+    std::printf("{\"began\": %.6f}\n", to_seconds(began.time_since_epoch()));
+    std::fflush(stdout);
     std::optional<Time> first;
     while (auto m = source_.next()) {
       if (!first) first = source_.recorded();
@@ -134,6 +138,7 @@ class Player {
     options[Sensor::imu] = {true, "/imu", 200, 0};
     options[Sensor::legs] = {true, "/joint_states", 1000, 0};
     options[Sensor::lidar] = {true, "/points", 10, 0};
+    options[Sensor::camera] = {words.option("--only", "").find("camera") != std::string::npos, "/camera/image_raw", 10, 0};
     options.start = std::stod(words.option("--start", "0"));
     options.duration = std::stod(words.option("--seconds", "1e9"));
     return options;
@@ -155,6 +160,9 @@ class Player {
     } else if (const auto* scan = std::get_if<LidarScan>(&m)) {
       writer = lidar_;
       message = cloud_message(*scan);
+    } else if (const auto* image = std::get_if<CameraImage>(&m)) {
+      writer = camera_;
+      message = image_message(*image);
     }
     if (writer != nullptr) writer->write(&message);
   }
@@ -171,7 +179,7 @@ class Player {
   Peer peer_;
   bool with_low_state_;
   lab::RecordingSource source_;
-  DataWriter *imu_ = nullptr, *legs_ = nullptr, *lidar_ = nullptr;
+  DataWriter *imu_ = nullptr, *legs_ = nullptr, *lidar_ = nullptr, *camera_ = nullptr;
   ImuSample newest_;
   std::uint64_t count_ = 0;
 };
@@ -263,6 +271,45 @@ int disturb(const Words& words) {
   return 0;
 }
 
+/// Asks until there is an answer, for a request that comes before both sides have found each other is lost.
+int call(const Words& words) {
+  const std::string path = words.plain.at(2), type = path.find("/pause/") != std::string::npos ? "SetBool" : "Trigger";
+  constexpr std::uint64_t client = 4711;
+  std::mutex mutex;
+  std::string answer;
+  Ear replies([&](std::vector<char>& bytes) {
+    eprosima::fastcdr::FastBuffer buffer(bytes.data(), bytes.size());
+    Cdr cdr(buffer, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
+    cdr.read_encapsulation();
+    std::uint64_t to = 0;
+    std::int64_t number = 0;
+    bool success = false;
+    std::string message;
+    cdr >> to >> number >> success >> message;
+    if (to != client) return;
+    const std::lock_guard lock(mutex);
+    if (answer.empty()) answer = std::string("{\"success\": ") + (success ? "true" : "false") + ", \"message\": \"" + message + "\"}";
+  });
+  Peer peer(std::stoi(words.plain.at(1)));
+  peer.reader("rr/" + path + "Reply", "std_srvs::srv::dds_::" + type + "_Response_", &replies);
+  DataWriter* writer = peer.writer("rq/" + path + "Request", "std_srvs::srv::dds_::" + type + "_Request_", true);
+  for (std::int64_t attempt = 0; attempt < 40; ++attempt) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(250));
+    const std::lock_guard lock(mutex);
+    if (!answer.empty()) {
+      std::printf("%s\n", answer.c_str());
+      return 0;
+    }
+    if (attempt % 8 != 1) continue;
+    CdrBuffer out;
+    out.cdr() << client << attempt << static_cast<std::uint8_t>(words.plain.size() > 3 && words.plain[3] == "1");
+    RawMessage message = out.message();
+    writer->write(&message);
+  }
+  std::printf("{}\n");
+  return 1;
+}
+
 int run(int argc, char** argv) {
   Words words;
   for (int i = 1; i < argc; ++i) {
@@ -275,6 +322,7 @@ int run(int argc, char** argv) {
   }
   if (words.plain.size() < 3) return 2;
   if (words.plain[0] == "listen") return listen(words);
+  if (words.plain[0] == "call") return call(words);
   if (words.plain[0] != "play") return disturb(words);
   Player(words).play();
   return 0;
