@@ -1,8 +1,14 @@
 # `make package`: kilvo (program, configurations, documents) and, where the node for ROS 1 is built, kilvo-ros1, as Debian packages.
 # scripts/make_manual has written the manual page and the completions by then.
 set(documents ${CMAKE_INSTALL_DATADIR}/doc/kilvo)
-install(FILES README.md CITATION.cff DESTINATION ${documents} COMPONENT program)
-install(DIRECTORY docs/ DESTINATION ${documents}/docs COMPONENT program PATTERN decisions EXCLUDE)
+# Links lead to what is there under another name.
+file(READ README.md readme)
+string(REPLACE "](CHANGELOG.md)" "](CHANGELOG.md.gz)" readme "${readme}")
+string(REPLACE "](LICENSE)" "](copyright)" readme "${readme}")
+file(WRITE ${CMAKE_BINARY_DIR}/README.md "${readme}")
+install(FILES ${CMAKE_BINARY_DIR}/README.md CITATION.cff DESTINATION ${documents} COMPONENT program)
+install(DIRECTORY docs/ DESTINATION ${documents}/docs COMPONENT program)
+install(FILES tests/consumer/main.cpp DESTINATION ${documents}/tests/consumer COMPONENT program)
 set(manual ${CMAKE_BINARY_DIR}/manual)
 install(FILES ${manual}/kilvo.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program OPTIONAL)
 install(FILES ${manual}/kilvo.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME kilvo COMPONENT program OPTIONAL)
