@@ -1,6 +1,7 @@
 // kilvo convert IN... OUT
 #include "lab/recordings/convert.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
 #include <memory>
@@ -13,6 +14,7 @@
 #include "lab/messages/input_error.hpp"
 #include "lab/recordings/output_recording.hpp"
 #include "lab/recordings/recording_file.hpp"
+#include "lab/settings/nearest.hpp"
 #include "lab/settings/settings.hpp"
 
 namespace kilvo::cli {
@@ -41,6 +43,10 @@ T choose(const std::string& word, const char* option, std::initializer_list<std:
 lab::OutputFormat format_of(const fs::path& out, const ConvertWords& words) {
   using Format = lab::OutputFormat;
   Format format = lab::output_format(out);
+  // A folder by that name may be meant, or a format that there is none of.
+  if (format.folder && words.storage.empty() && out.has_extension())
+    throw UsageError(fmt::format("convert: {}: no format is called {} (.bag, .mcap, .db3); --storage mcap writes a folder of that name",
+                                 out.string(), out.extension().string()));
   if (!words.storage.empty()) {
     if (!format.folder) throw UsageError("convert: --storage is for folders; the name of a file says its format");
     format.storage =
@@ -69,6 +75,23 @@ void add_topics_of(const std::string& config, const lab::RecordingReader& record
   if (topics.empty()) throw lab::InputError(fmt::format("{}: none of the topics in {} is in it", recording.name(), config));
 }
 
+std::string_view without_slash(std::string_view topic) { return topic.starts_with('/') ? topic.substr(1) : topic; }
+
+/// What is asked for by name and time must be there, before anything is written.
+void check_choice(const ConvertWords& words, const lab::RecordingReader& recording) {
+  std::vector<std::string> names;
+  for (const auto& [id, channel] : recording.connections()) names.push_back(channel.topic);
+  if (names.empty()) throw lab::InputError(fmt::format("{}: holds no messages", recording.name()));
+  for (const std::string& topic : words.topics) {
+    const auto named = [&](const std::string& name) { return without_slash(name) == without_slash(topic); };
+    if (std::ranges::none_of(names, named))
+      throw lab::InputError(fmt::format("{}: no topic {}, nearest is {}", recording.name(), topic, lab::nearest(topic, names)));
+  }
+  const double lasts = to_seconds(recording.end() - recording.begin());
+  if (words.start > lasts)
+    throw lab::InputError(fmt::format("{}: ends after {:.3f} s, before --start {:g}", recording.name(), lasts, words.start));
+}
+
 void check_target(const fs::path& out, const lab::OutputFormat& format, const std::vector<fs::path>& inputs, bool force) {
   std::error_code error;
   for (const fs::path& input : inputs) {
@@ -87,6 +110,7 @@ int convert(const ConvertWords& words) {
   const lab::OutputFormat format = format_of(out, words);
   check_target(out, format, inputs, words.force);
   const auto from = lab::open_recordings(inputs);
+  check_choice(words, *from);
   lab::ConvertOptions options{{words.topics.begin(), words.topics.end()}, words.start, words.duration, format.encoding(), false};
   options.keep_foreign = format.storage == lab::OutputFormat::Storage::mcap;
   if (!words.config.empty()) add_topics_of(words.config, *from, options.topics);
@@ -103,6 +127,7 @@ int convert(const ConvertWords& words) {
   for (const lab::Damage& damage : report.damages)
     fmt::print(stderr, "kilvo: warning: {}: damaged at byte {}: {}\n", damage.file.empty() ? from->name() : damage.file, damage.offset,
                damage.reason);
+  if (interrupt.requested()) fmt::print(stderr, "kilvo: error: stopped by the user: {} is not complete\n", out.string());
   if (!words.quiet) fmt::print("{}: {} messages\n", out.string(), report.messages);
   return interrupt.requested() ? run_failed : done;
 }

@@ -1,6 +1,9 @@
 #include "apps/cli/output_folder.hpp"
 
+#include <cerrno>
+#include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/file.h>
 #include <system_error>
 
 #include "apps/cli/csv_file.hpp"
@@ -23,6 +26,13 @@ void prepare_folder(const fs::path& folder) {
   const fs::path probe = folder / ".kilvo_can_write_here";
   write_text_file(probe, "");
   fs::remove(probe, error);
+}
+
+void claim_folder(const fs::path& folder) {
+  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  // Some file systems have no locks: there two programs do not notice each other.
+  if (descriptor >= 0 && flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    throw lab::OutputError(fmt::format("{}: another kilvo is writing into it", folder.string()));
 }
 
 void remove_results(const fs::path& folder) {

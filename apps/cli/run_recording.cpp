@@ -277,6 +277,7 @@ int run_recording(const RunOptions& options) {
   const std::filesystem::path config = config_file(options.config, options.inputs.front());
   lab::Settings settings = lab::load_settings(config, options.overrides);
   prepare_folder(options.out);
+  claim_folder(options.out);
   remove_results(options.out);
   if (options.map) prepare_folder(std::filesystem::absolute(*options.map).parent_path());
   SensorChoice choice = choose_sensors(options.sensors, settings, config.string(), options.inputs);

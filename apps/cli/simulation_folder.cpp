@@ -144,6 +144,7 @@ double simulate_into(const fs::path& folder, const SimulationOptions& options) {
   try {
     lab::Simulator simulator(scenario, robot.truth);
     prepare_folder(folder);
+    claim_folder(folder);
     Progress progress(Progress::style_for(options.quiet));
     write_text_file(folder / "robot.urdf", lab::urdf_of(robot.known.shape));
     write_text_file(folder / "config.yaml", lab::simulated_config(robot.known, "robot.urdf"));

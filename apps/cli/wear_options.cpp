@@ -1,5 +1,6 @@
 #include "apps/cli/wear_options.hpp"
 
+#include <cmath>
 #include <iterator>
 #include <numbers>
 
@@ -42,6 +43,12 @@ constexpr WearOption table[] = {
      [](SimulatorConfig& c) -> double& { return c.imu.delivery.rate; }},
 };
 
+// A range of CLI11 lets NaN pass, as it is neither below nor above.
+std::string refuse_nan(const std::string& word) {
+  double value = 0;
+  return CLI::detail::lexical_cast(word, value) && std::isnan(value) ? word + " is not a number" : std::string();
+}
+
 static_assert(std::size(table) == std::tuple_size_v<decltype(WearOptions::given)>);
 
 }  // namespace
@@ -49,7 +56,11 @@ static_assert(std::size(table) == std::tuple_size_v<decltype(WearOptions::given)
 void add_wear_options(CLI::App& verb, WearOptions& options) {
   for (std::size_t i = 0; i < std::size(table); ++i) {
     const WearOption& o = table[i];
-    verb.add_option(o.name, options.given[i], o.text)->type_name(o.unit)->check(CLI::Range(o.low, o.high))->group("Wear of the robot");
+    verb.add_option(o.name, options.given[i], o.text)
+        ->type_name(o.unit)
+        ->check(CLI::Range(o.low, o.high))
+        ->check(refuse_nan)
+        ->group("Wear of the robot");
   }
 }
 

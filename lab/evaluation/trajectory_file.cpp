@@ -66,6 +66,10 @@ StampedPose parse_line(const Words& words, const Place& place) {
   if (!t) fail(place, quoted(words[0]) + " is not a time in seconds");
   std::array<double, columns - 1> v{};
   for (std::size_t i = 1; i < columns; ++i) v[i - 1] = parse_number(words[i], place);
+  constexpr double farthest = 1e9;  // m; squares of more, summed, are soon no numbers
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (std::abs(v[i]) > farthest) fail(place, quoted(words[i + 1]) + " m is no position on Earth");
+  }
   const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
   const double norm = q.norm();
   if (!(std::abs(norm - 1.0) <= quaternion_norm_tolerance)) {

@@ -63,6 +63,7 @@ TEST_F(TumFile, NamesFileAndLineOfABadLine) {
   EXPECT_EQ(error_of(good + "2 0 1.0x 0 0 0 0 1\n"), "gt.tum:3: '1.0x' is not a number");
   EXPECT_EQ(error_of(good + "2 0 nan 0 0 0 0 1\n"), "gt.tum:3: 'nan' is not finite");
   EXPECT_EQ(error_of(good + "2 0 0 0 0 0 0 -inf\n"), "gt.tum:3: '-inf' is not finite");
+  EXPECT_EQ(error_of(good + "2 0 -1e300 0 0 0 0 1\n"), "gt.tum:3: '-1e300' m is no position on Earth");
   EXPECT_THAT(error_of(good + "2 0 0 0 0 0 0 0\n"), StartsWith("gt.tum:3: the quaternion qx qy qz qw has norm 0.0"));
   EXPECT_THAT(error_of(good + "2 0 0 0 1 1 0 1\n"), HasSubstr("norm 1.73"));
   EXPECT_EQ(error_of(good + "0.9 0 0 0 0 0 0 1\n"), "gt.tum:3: time goes backwards: 0.9 comes after a later pose");

@@ -45,6 +45,8 @@ RecordingSource::RecordingSource(const std::vector<std::filesystem::path>& input
       throw InputError(reader_->name() + ": " + error.what());
     }
   }
+  if (const double lasts = to_seconds(duration()); options_.start > lasts)
+    throw InputError(reader_->name() + ": ends after " + std::to_string(lasts) + " s, before --start " + std::to_string(options_.start));
   const ChosenTopic& lidar = chosen_[static_cast<std::size_t>(Sensor::lidar)];
   if (!lidar.topic.empty() && !options_.no_deskew) {
     point_time_ = find_point_time(*reader_, lidar, options_[Sensor::lidar].rate).value_or(PointTimeFormat{});

@@ -66,6 +66,22 @@ std::optional<std::string> opposite_pose(const std::string& name) {
   return "T_" + name.substr(middle + 1) + "_" + name.substr(2, middle - 2);
 }
 
+std::string pose_forms_text() {
+  return "a pose is {p: [x, y, z]} in metres with one of R: [9 numbers, row by row], q: [x, y, z, w], rpy: [roll, pitch, yaw] in radians";
+}
+
+std::optional<std::string> matrix_pose_text(const YAML::Node& matrix) {
+  std::vector<double> n;
+  for (const YAML::Node& entry : matrix) {
+    const std::vector<double> row = entry.IsSequence() ? numbers_of(entry) : std::vector<double>{entry.as<double>()};
+    n.insert(n.end(), row.begin(), row.end());
+  }
+  if (n.size() != 12 && n.size() != 16) return std::nullopt;
+  std::string R;
+  for (const std::size_t i : {0U, 1U, 2U, 4U, 5U, 6U, 8U, 9U, 10U}) R += fmt::format("{}{:.10g}", R.empty() ? "" : ", ", n[i]);
+  return fmt::format("{{p: [{:.10g}, {:.10g}, {:.10g}], R: [{}]}}", n[3], n[7], n[11], R);
+}
+
 std::string inverse_pose_text(const YAML::Node& pose) {
   if (!pose.IsMap() || !pose["p"]) throw BadValue(pose, "must be a pose {p, R}");
   SE3 T;

@@ -16,6 +16,13 @@ SO3 read_rotation_form(const std::string& form, const YAML::Node& node);
 /// T_lidar_imu for T_imu_lidar; none when the name is not of that shape.
 std::optional<std::string> opposite_pose(const std::string& name);
 
+/// For who wrote it in none of the ways.
+std::string pose_forms_text();
+
+/// {p: [...], R: [...]} of a matrix of 3 x 4 or 4 x 4 numbers, in rows or one list; none when it has another size. Throws on what are no
+/// numbers.
+std::optional<std::string> matrix_pose_text(const YAML::Node& matrix);
+
 /// {p: [...], R: [...]} of the inverse of a pose {p, R | q | rpy}. Throws BadValue.
 std::string inverse_pose_text(const YAML::Node& pose);
 

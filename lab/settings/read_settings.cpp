@@ -104,6 +104,7 @@ class Reader {
     } else if (node.IsMap()) {
       read_section(node, key);
     } else if (!node.IsNull()) {  // a section with nothing in it is fine
+      if (is_pose(key)) throw ConfigError(fmt::format("{}: {}: {}{}", place(line), key, pose_forms_text(), converted(node)));
       throw ConfigError(fmt::format("{}: {}: must be a map of settings", place(line), key));
     }
   }
@@ -134,6 +135,18 @@ class Reader {
     return setting == list_.end() || !std::holds_alternative<SO3*>(setting->value) ? nullptr : &*setting;
   }
 
+  bool is_pose(const std::string& section) const { return std::ranges::find(list_, section + ".R", &Setting::key) != list_.end(); }
+
+  // What a matrix of a pose would be.
+  static std::string converted(const YAML::Node& node) {
+    try {
+      const auto pose = node.IsSequence() ? matrix_pose_text(node) : std::nullopt;
+      return pose ? "; the matrix given is " + *pose : "";
+    } catch (const std::exception&) {  // no numbers
+      return "";
+    }
+  }
+
   [[noreturn]] void refuse_unknown(const std::string& key, const YAML::Node& node, int line) const {
     const std::size_t dot = key.rfind('.');
     const std::string section = dot == std::string::npos ? "" : key.substr(0, dot + 1);
@@ -147,6 +160,8 @@ class Reader {
       throw ConfigError(fmt::format("{}: {}: must be {}, which takes a point of the second frame into the first{}", place(line), key,
                                     section + *opposite, conversion));
     }
+    if (!section.empty() && is_pose(section.substr(0, section.size() - 1)))
+      throw ConfigError(fmt::format("{}: {}: no such setting: {}", place(line), key, pose_forms_text()));
     throw ConfigError(fmt::format("{}: {}: no such setting, nearest is {}", place(line), key, nearest_name(key)));
   }
 

@@ -144,6 +144,28 @@ TEST(Settings, APoseOfTheOppositeDirectionIsAnsweredWithItsInverse) {
       "the pose given is T_imu_lidar: {p: [-2, 1, -3], R: [0, 1, 0, -1, 0, 0, 0, 0, 1]}");
 }
 
+TEST(Settings, OtherFormsOfAPoseAreAnsweredWithThoseThatThereAre) {
+  const std::string forms =
+      "a pose is {p: [x, y, z]} in metres with one of R: [9 numbers, row by row], q: [x, y, z, w], rpy: [roll, pitch, yaw] in radians";
+  for (const std::string name : {"quaternion", "euler", "rotation", "translation", "rpy_deg"}) {
+    EXPECT_EQ(error_of("lidar: {T_imu_lidar: {" + name + ": [0, 0, 0]}}"),
+              "robot.yaml:1: lidar.T_imu_lidar." + name + ": no such setting: " + forms);
+  }
+  const std::string conversion = "; the matrix given is {p: [1, 2, 3], R: [0, -1, 0, 1, 0, 0, 0, 0, 1]}";
+  EXPECT_EQ(error_of("lidar: {T_imu_lidar: [0, -1, 0, 1, 1, 0, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1]}"),
+            "robot.yaml:1: lidar.T_imu_lidar: " + forms + conversion);
+  EXPECT_EQ(error_of("lidar: {T_imu_lidar: [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3]]}"),
+            "robot.yaml:1: lidar.T_imu_lidar: " + forms + conversion);
+  EXPECT_EQ(error_of("lidar: {T_imu_lidar: [1, x]}"), "robot.yaml:1: lidar.T_imu_lidar: " + forms);
+}
+
+TEST(Settings, NumbersThatNoRobotHasAreRefused) {
+  EXPECT_THAT(error_of("imu: {gyro_noise: 1e300}"), HasSubstr("imu.gyro_noise: must be above 0, at most 1000, not 1e+300"));
+  EXPECT_THAT(error_of("lidar: {T_imu_lidar: {p: [1e30, 0, 0]}}"),
+              HasSubstr("lidar.T_imu_lidar.p: must be metres on a robot, at most 10000 each, not [1e+30, 0, 0]"));
+  EXPECT_EQ(error_of("lidar: {T_imu_lidar: {p: [-11, -23.29, 44.12]}}"), "no error") << "millimetres are for `kilvo doctor` to name";
+}
+
 TEST(Settings, AllMistakesAreToldAtOnce) {
   EXPECT_EQ(error_of("lidar:\n  voxel_size: big\n  rate: 0\ncamera:\n  topik: /c\n", {"map.radius=-1"}),
             "robot.yaml:2: lidar.voxel_size: must be a number, not 'big'\n"

@@ -73,7 +73,14 @@ std::vector<double> read_numbers(const YAML::Node& node, std::optional<std::size
   return out;
 }
 
-Eigen::Vector3d read_vector(const YAML::Node& node) { return Eigen::Vector3d(read_numbers(node, 3, "a list of 3 numbers").data()); }
+Eigen::Vector3d read_vector(const YAML::Node& node) {
+  constexpr double farthest = 10000;  // m; millimetres are still answered by who holds them against a recording
+  const Eigen::Vector3d p(read_numbers(node, 3, "a list of 3 numbers").data());
+  if (p.cwiseAbs().maxCoeff() > farthest)
+    throw BadValue(node,
+                   fmt::format("must be metres on a robot, at most {:g} each, not [{:g}, {:g}, {:g}]", farthest, p.x(), p.y(), p.z()));
+  return p;
+}
 
 SO3 read_rotation(const YAML::Node& node) {
   const std::vector<double> n = read_numbers(node, 9, "a list of 9 numbers (a rotation matrix, row by row)");

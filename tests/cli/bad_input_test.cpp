@@ -52,6 +52,11 @@ TEST_F(BadInput, AnEmptyBag) {
   expect_refused(run({"--sensors", "imu"}), 3, "recording.bag");
 }
 
+TEST_F(BadInput, AStartBehindTheEnd) {
+  record(small_walk(2).measurements);
+  expect_refused(run({"--start", "50"}), 3, "recording.bag: ends after ");
+}
+
 TEST_F(BadInput, AWrongTopicNamesTheNearest) {
   record(small_walk(2).measurements);
   expect_refused(run({"--sensors", "imu,lidar", "--set", "lidar.topic=/point"}), 3, "/points");

@@ -92,6 +92,15 @@ TEST_F(Formats, ConvertRefusesWhatMakesNoSense) {
   EXPECT_EQ(kilvo({"convert", recording(), folder / "x.bag", "--compression", "zstd"}).code, 2);
   EXPECT_EQ(kilvo({"convert", recording(), folder / "x.mcap", "--split", "1"}).code, 2);
   EXPECT_EQ(kilvo({"convert", folder / "nothing.bag", folder / "x.mcap"}).code, 3);
+  const auto refused = [&](const std::vector<std::string>& words, int code, const std::string& text) {
+    const Finished f = convert(words);
+    EXPECT_EQ(f.code, code) << f.err;
+    EXPECT_THAT(f.err, HasSubstr(text));
+    EXPECT_FALSE(fs::exists(words.front()));
+  };
+  refused({folder / "x.txt"}, 2, "no format is called .txt (.bag, .mcap, .db3)");
+  refused({folder / "x.mcap", "--topics", "/imu,/nope"}, 3, "no topic /nope, nearest is");
+  refused({folder / "x.mcap", "--start", "50"}, 3, "before --start 50");
   write_text(folder / "there.mcap", "mine");
   EXPECT_EQ(convert({folder / "there.mcap"}).code, 2);
   EXPECT_EQ(read_text(folder / "there.mcap"), "mine");

@@ -237,6 +237,15 @@ TEST(Simulate, AnUnknownPartOfRoughnessIsSaid) {
   EXPECT_FALSE(std::filesystem::exists(folder / "x"));
 }
 
+TEST(Simulate, WearThatIsNoNumberIsRefused) {
+  const TemporaryFolder folder;
+  for (const char* option : {"--leg-rate", "--imu-rate", "--lost", "--shock"}) {
+    const Finished f = kilvo({"simulate", "stand", option, "nan", "--out", folder / "x", "--duration", "0.2"});
+    EXPECT_EQ(f.code, 2) << option;
+    EXPECT_THAT(f.err, HasSubstr(std::string(option) + ": nan is not a number"));
+  }
+}
+
 TEST(Simulate, HelpListsTheScenarios) {
   const Finished f = kilvo({"simulate", "--help"});
   EXPECT_EQ(f.code, 0);
