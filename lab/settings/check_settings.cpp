@@ -1,6 +1,7 @@
 #include "lab/settings/check_settings.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/core.h>
 
 #include "lab/settings/nearest.hpp"
@@ -55,6 +56,10 @@ void check_together(const Settings& s, Problems& problems) {
     complain(touched("map.full_points", "map.min_points"),
              fmt::format("map.full_points ({}) must not be below map.min_points ({})", map.full_points, map.min_points));
   }
+  constexpr double no_lens = 1000;
+  for (const double k : s.robot.camera.distortion) {
+    if (std::abs(k) > no_lens) complain("camera.distortion", fmt::format("must be numbers of a lens, not {:g}", k));
+  }
   const std::size_t n = s.robot.camera.distortion.size();
   const bool radtan = s.robot.camera.model == "pinhole_radtan";
   if (n != 0 && n != 4 && !(radtan && n == 5)) {
@@ -66,6 +71,10 @@ void check_names(const Settings& s, Problems& problems) {
   if (s.robot.urdf.empty()) return;
   const UrdfNames names = find_urdf_names(s.robot.urdf);
   if (names.links.empty()) refuse(s, "robot.urdf", fmt::format("{} has no links: not a URDF file", s.urdf_file));
+  // The reader of URDFs descends link by link, and its stack ends at some thousands of them.
+  constexpr std::size_t most_links = 1000;
+  if (names.links.size() > most_links)
+    refuse(s, "robot.urdf", fmt::format("{} has {} links, at most {} are read", s.urdf_file, names.links.size(), most_links));
   const auto check = [&](const std::string& key, const std::string& name, const std::vector<std::string>& valid, const char* what) {
     if (!name.empty() && std::ranges::find(valid, name) == valid.end()) {
       problems.collect(

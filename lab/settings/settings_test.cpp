@@ -163,6 +163,7 @@ TEST(Settings, NumbersThatNoRobotHasAreRefused) {
   EXPECT_THAT(error_of("imu: {gyro_noise: 1e300}"), HasSubstr("imu.gyro_noise: must be above 0, at most 1000, not 1e+300"));
   EXPECT_THAT(error_of("lidar: {T_imu_lidar: {p: [1e30, 0, 0]}}"),
               HasSubstr("lidar.T_imu_lidar.p: must be metres on a robot, at most 10000 each, not [1e+30, 0, 0]"));
+  EXPECT_THAT(error_of("camera: {distortion: [0, 1e300, 0, 0]}"), HasSubstr("camera.distortion: must be numbers of a lens, not 1e+300"));
   EXPECT_EQ(error_of("lidar: {T_imu_lidar: {p: [-11, -23.29, 44.12]}}"), "no error") << "millimetres are for `kilvo doctor` to name";
 }
 

@@ -153,6 +153,15 @@ TEST_F(UrdfInSettings, LinksAndJointsMustExist) {
               HasSubstr("no link 'foot_x'"));
 }
 
+TEST_F(UrdfInSettings, AChainWithoutEndIsRefused) {
+  std::ofstream file(folder_ / "long.urdf");
+  file << "<robot name='r'>";
+  for (int i = 0; i < 20000; ++i) file << "<link name='l" << i << "'/>";
+  file << "</robot>";
+  file.close();
+  EXPECT_THAT(error_of("robot: {urdf: long.urdf}"), HasSubstr("long.urdf has 20000 links, at most 1000 are read"));
+}
+
 TEST_F(UrdfInSettings, AMissingFileIsNamedWithItsSetting) {
   EXPECT_THAT(error_of("robot:\n  urdf: other.urdf\n"),
               testing::AllOf(HasSubstr("robot.yaml:2: robot.urdf: "), HasSubstr("other.urdf: no such URDF file")));
