@@ -9,13 +9,16 @@
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/held_output.hpp"
 #include "apps/cli/interrupt.hpp"
+#include "apps/cli/left_out.hpp"
 #include "apps/cli/make_estimator.hpp"
 #include "apps/cli/map_keeper.hpp"
 #include "apps/cli/output_folder.hpp"
 #include "apps/cli/pace.hpp"
 #include "apps/cli/progress.hpp"
 #include "apps/cli/read_ahead.hpp"
+#include "apps/cli/recording_options.hpp"
 #include "apps/cli/result_files.hpp"
+#include "apps/cli/run_failure.hpp"
 #include "apps/cli/sensor_choice.hpp"
 #include "apps/cli/shipped_config.hpp"
 #include "apps/cli/skeleton_file.hpp"
@@ -30,25 +33,6 @@
 namespace kilvo::cli {
 namespace {
 
-std::vector<std::filesystem::path> paths_of(const std::vector<std::string>& words) { return {words.begin(), words.end()}; }
-
-lab::RecordingOptions recording_options(const RunOptions& options, const lab::Settings& settings, const std::vector<Sensor>& used) {
-  const Robot& robot = settings.robot;
-  const double rates[] = {robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate};
-  const double offsets[] = {robot.imu.time_offset, robot.legs.time_offset, robot.lidar.time_offset, robot.camera.time_offset};
-  lab::RecordingOptions out;
-  for (const Sensor sensor : used) {
-    const auto i = static_cast<std::size_t>(sensor);
-    out[sensor] = {true, settings.topic(sensor), rates[i], offsets[i]};
-  }
-  const bool with_legs = std::ranges::find(used, Sensor::legs) != used.end();
-  if (with_legs && settings.leg_clock.clock != "stamp") out.leg_clock.emplace(settings.leg_clock, settings.robot);
-  out.no_deskew = options.no_deskew;
-  out.start = options.start;
-  out.duration = options.duration;
-  return out;
-}
-
 void tell_start(const RunFacts& facts, const lab::RecordingSource& source, bool no_deskew) {
   fmt::print(stderr, "kilvo: configuration {}\n", facts.config_file);
   for (const Sensor sensor : facts.sensors) {
@@ -61,12 +45,16 @@ void tell_start(const RunFacts& facts, const lab::RecordingSource& source, bool 
 /// Everything between the first message and the last file.
 class Run {
  public:
-  Run(const RunOptions& options, InterruptWatch& interrupt, lab::Settings settings, const SensorChoice& choice, RunFacts facts)
+  /// `known`: of a run before, which these findings spoilt; facts.sensors are those that are left, none when nothing can be estimated.
+  Run(const RunOptions& options, InterruptWatch& interrupt, const lab::Settings& settings, const SensorChoice& choice, RunFacts facts,
+      std::vector<lab::WrongDescription> known)
       : options_(options),
         interrupt_(interrupt),
-        settings_(std::move(settings)),
+        wrong_(std::move(known)),
+        again_(!wrong_.empty()),
+        settings_(settings),
         facts_(std::move(facts)),
-        source_(paths_of(options.inputs), recording_options(options, settings_, choice.used)),
+        source_({options.inputs.begin(), options.inputs.end()}, recording_options(options, settings_, choice.used)),
         failing_(source_, options.failures, source_.begin(), [this] { return source_.recorded(); }),
         estimator_(make_estimator(settings_, choice.used)),
         map_(settings_.mapping, options.threads > 1 || options.realtime),
@@ -82,12 +70,15 @@ class Run {
     if (!options.quiet) tell_start(facts_, source_, options.no_deskew);
   }
 
-  int all() {
-    const bool interrupted = options_.realtime ? replay_live() : replay();
+  /// None: the description is wrong, as wrong() says, and the run has to begin anew without what that spoils.
+  std::optional<int> all() {
+    const bool interrupted = options_.realtime ? replay_live() : !facts_.sensors.empty() && replay();
     progress_.finish();
+    if (!again_ && !spoilt_ && !interrupted) wrong_ = description_.finish();
+    if (!again_ && !options_.realtime && !first_spoiling(wrong_).empty()) return std::nullopt;
     files_.write_events(estimator_.take_events());
-    facts_.failure = failure(interrupted);
     if (!interrupted) settle_description();
+    if (facts_.failure.empty()) facts_.failure = failure(interrupted);
     files_.close();
     if (log_) log_->close();
     skeleton_.close();
@@ -100,25 +91,37 @@ class Run {
     tell_end();
     return facts_.failure.empty() ? done : run_failed;
   }
+  const std::vector<lab::WrongDescription>& wrong() const { return wrong_; }
 
  private:
   // Said as soon as the evidence is in; the files get it at the end, where it does not depend on how fast it was judged.
   void hold_against_description(const Measurement& measurement) {
+    if (again_) return;
     description_.take(measurement);
-    for (const auto& [finding, t, after, spoils] : description_.news()) {
+    for (lab::WrongDescription& wrong : description_.news()) {
       progress_.finish();
-      fmt::print(stderr, "kilvo: {}: after {:.1f} s of data: {}\n", spoils ? "error" : "warning", after, finding.text);
+      fmt::print(stderr, "kilvo: {}: after {:.1f} s of data: {}\n", wrong.spoils ? "error" : "warning", wrong.after, wrong.finding.text);
+      spoilt_ = spoilt_ || (wrong.spoils && !options_.realtime);
+      wrong_.push_back(std::move(wrong));
     }
   }
 
   // A run with a wrong description has failed, however good it looks.
   void settle_description() {
-    for (const auto& [finding, t, after, spoils] : description_.finish()) {
+    for (const auto& [finding, t, after, spoils] : wrong_) {
       facts_.warnings.push_back(fmt::format("{}; {}", finding.text, finding.remedy));
       files_.write_description(t, finding.sensor, spoils, finding.size, facts_.warnings.back());
       if (facts_.failure.empty() && spoils)
-        facts_.failure = fmt::format("the robot's description is wrong: {} (kilvo doctor shows the evidence)", finding.text);
+        facts_.failure = fmt::format("the robot's description is wrong: {} (kilvo doctor shows the evidence){}", finding.text, remains());
     }
+  }
+
+  std::string remains() const {
+    if (!again_) return "";
+    if (facts_.sensors.empty()) return "; nothing is left to estimate with";
+    std::string names;
+    for (const Sensor sensor : facts_.sensors) names += (names.empty() ? "" : ", ") + std::string(name_of(sensor));
+    return "; the results are of " + names + " alone";
   }
 
   // True when the user stopped it.
@@ -130,12 +133,14 @@ class Run {
       require_legs(*measurement);
       skeleton_.add(*measurement);
       hold_against_description(*measurement);
+      if (spoilt_) break;
       keep(estimator_.push(*std::move(measurement)));
       progress_.update(input.progress(), [this] { return progress_note(); });
       interrupted = interrupt_.requested();
       if (interrupted) break;
     }
     input.stop();
+    if (spoilt_) return false;
     keep(estimator_.finish());
     levelling_.finish();
     write_waiting();
@@ -220,23 +225,8 @@ class Run {
   }
 
   std::string failure(bool interrupted) const {
-    const RunSummary& run_summary = files_.run_summary();
-    const bool with_lidar = !source_.topic(Sensor::lidar).empty();
     if (interrupted) return "stopped by the user";
-    if (run_summary.outputs() == 0) {
-      const std::string why = estimator_.waiting_for();
-      return "nothing was estimated: " + (why.empty() ? "no measurements" : "still " + why);
-    }
-    if (estimator_.statistics().epochs > 1)
-      return "the recording's time goes back by more than 2 s: what follows is another recording, and is not in the results (--start and "
-             "--duration choose a part)";
-    if (!run_summary.absurdity().empty()) return "diverged: " + run_summary.absurdity();
-    for (const Event& event : estimator_.statistics().events) {
-      if (event.reason == Reason::diverged) return "diverged: " + event.detail;
-    }
-    const bool legs_used = estimator_.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
-    if (with_lidar && run_summary.sweeps() == 0 && !legs_used) return "no LiDAR scan could be used";
-    return "";
+    return failure_of(files_.run_summary(), estimator_, !source_.topic(Sensor::lidar).empty());
   }
 
   void tell_end() const {
@@ -253,6 +243,8 @@ class Run {
 
   const RunOptions& options_;
   InterruptWatch& interrupt_;
+  std::vector<lab::WrongDescription> wrong_;
+  bool again_, spoilt_ = false;  // this is the second run; the first one is over
   lab::Settings settings_;
   RunFacts facts_;
   lab::RecordingSource source_;
@@ -291,7 +283,18 @@ int run_recording(const RunOptions& options) {
   facts.sensors = choice.used;
   facts.warnings = choice.warnings;
   InterruptWatch interrupt;  // before any thread, so that none of them takes the signal
-  return Run(options, interrupt, std::move(settings), choice, std::move(facts)).all();
+  std::vector<lab::WrongDescription> wrong;
+  {
+    Run run(options, interrupt, settings, choice, facts, {});
+    if (const std::optional<int> code = run.all()) return *code;
+    wrong = first_spoiling(run.wrong());
+  }
+  // No trajectory leaves that a wrong description has spoilt: what is left estimates anew, from the beginning.
+  facts.sensors = without_spoiled(choice.used, wrong);
+  if (!options.quiet)
+    fmt::print(stderr, "kilvo: {}\n", facts.sensors.empty() ? "nothing is left to estimate with" : "the run begins anew with what is left");
+  if (!facts.sensors.empty()) choice.used = facts.sensors;
+  return *Run(options, interrupt, settings, choice, facts, std::move(wrong)).all();
 }
 
 }  // namespace kilvo::cli

@@ -164,7 +164,7 @@ Diagnosis Examination::run() {
   examine_camera();
   blame_imu_for_all();
   const bool legs = recorded_.legs.size() >= 100 && robot_.legs.type == "joints";
-  diagnosis_.settled = (recorded_.sweeps.size() < 30 || lidar_.known) && (!legs || (legs_.known && legs_turned()));
+  diagnosis_.settled = !open_ && (recorded_.sweeps.size() < 30 || lidar_.known) && (!legs || (legs_.known && legs_turned()));
   return diagnosis_;
 }
 

@@ -66,7 +66,9 @@ class Examination {
   /// Legs that hardly turn show how they bend, not how they are mounted.
   bool legs_turned() const;
   bool feet_stand() const;
-  bool try_standing_hypotheses();
+  bool find_leg_start();
+  /// Only those that stand longer than so many seconds.
+  bool try_standing_hypotheses(double longer_than = 0);
   struct LegScore {
     double explained = 0, flatness = 0;  // share; degrees
     double offset = 0;
@@ -122,6 +124,8 @@ class Examination {
   std::vector<Turn> lidar_turns_, leg_turns_;
   SenseAgreement lidar_, legs_;
   std::optional<LegHypothesis> leg_mend_;
+  std::optional<SO3> leg_start_;              // mount of the IMU on its link, far from the described one, from which that is looked for
+  bool open_ = false;                         // something seems wrong, and more data would make it sure
   double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock
   std::optional<TranslationFit> translation_;
   std::optional<StanceFit> stances_;

@@ -225,9 +225,10 @@ std::vector<LegHypothesis> foot_link_hypotheses(const Robot& robot) {
 }
 
 std::vector<std::string> link_names(const std::string& urdf) {
+  constexpr std::size_t most = 200;  // no robot has more, and each is tried
   std::vector<std::string> out;
   const std::regex pattern("<link\\s+name\\s*=\\s*\"([^\"]+)\"");
-  for (std::sregex_iterator it(urdf.begin(), urdf.end(), pattern), end; it != end; ++it) out.push_back((*it)[1]);
+  for (std::sregex_iterator it(urdf.begin(), urdf.end(), pattern), end; it != end && out.size() < most; ++it) out.push_back((*it)[1]);
   return out;
 }
 

@@ -20,7 +20,7 @@ MountFit Examination::measure_leg_mount() const {
   const SO3 described = robot_.imu.T_link_imu.R.inverse();
   const GyroPath path = gyro();
   const auto fit_from = [&](const SO3& start) {
-    MountFit fit = fit_mount(leg_turns_, path, start, legs_.offset);
+    MountFit fit = fit_mount(leg_turns_, path, start, leg_start_ ? leg_offset_ : legs_.offset);
     const double explained = fit.explained;
     for (int k = 0; k < 2 && fit.fit.good; ++k) fit = fit_mount(best_half(leg_turns_, path, fit), path, fit.R, fit.offset);
     fit.explained = explained;
@@ -42,10 +42,15 @@ void Examination::examine_leg_rotation() {
   Robot start = robot_;
   const double far = degrees((fit.R * described.inverse()).Log().norm());
   constexpr double near = 15;  // degrees
-  if (fit.fit.good && far > near) start.imu.T_link_imu.R = fit.R.inverse();
+  if (leg_start_) {
+    start.imu.T_link_imu.R = *leg_start_;
+  } else if (fit.fit.good && far > near) {
+    start.imu.T_link_imu.R = fit.R.inverse();
+  }
   StanceFit stances;
   if (!way.empty())
-    stances = fit_stances(recorded_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(), fit.fit.good ? fit.offset : leg_offset_);
+    stances = fit_stances(recorded_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(),
+                          fit.fit.good && !leg_start_ ? fit.offset : leg_offset_);
   if (!fit.fit.good && !stances.good) {
     check(Sensor::legs, "mount of the IMU", Check::Verdict::unknown, "too few steps");
     return;
@@ -79,6 +84,7 @@ void Examination::examine_leg_rotation() {
       diagnosis_.findings.back().evidence = "turning of the legs against the gyro's: " + detail;
     }
   } else {
+    open_ |= stances.good ? angle > rotation_tolerance : !way.empty();
     check(Sensor::imu, "rotation of its mount on the robot", uncertain > 3 ? Check::Verdict::unknown : Check::Verdict::good, detail);
   }
   if (stances.good) fit.explained = 1;  // the feet stand

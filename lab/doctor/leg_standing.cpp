@@ -6,9 +6,33 @@
 #include "lab/doctor/leg_hypotheses.hpp"
 
 namespace kilvo::lab {
+namespace {
+
+// A description stands clearly better than another: factor, and seconds more.
+constexpr double clearly = 1.3, least_standing = 2;
+
+}  // namespace
+
+// The clock of the legs, or a mount of the IMU that is right angles away, under which the feet stand as they do under no other description
+// of the legs: from there the fit of the stances finds both. The turning alone does not tell them on soles that roll.
+bool Examination::find_leg_start() {
+  const LidarWay way = lidar_way();
+  if (way.empty() || (legs_.known && legs_.agrees)) return false;
+  const GyroPath path = gyro();
+  const LegHypothesis* mend = leg_mend_ ? &*leg_mend_ : nullptr;
+  const Standing described = standing_time(recorded_, robot_, mend, way, path, 0);
+  constexpr double enough = 0.1;  // of the time in which the robot moves: soles that seem to stand by chance do so for a hundredth of it
+  if (described.balanced() && described.both() > enough * described.moving) return false;
+  const LegStart start = longest_standing(recorded_, robot_, mend, way, path);
+  if (start.standing.both() < clearly * described.both() + least_standing) return false;
+  if (try_standing_hypotheses(start.standing.both())) return true;
+  leg_offset_ = start.offset;
+  leg_start_ = start.R_link_imu;
+  return true;
+}
 
 // Whatever turns as the gyro does may still not stand: joints of parallel axes exchanged, legs exchanged, soles on another link.
-bool Examination::try_standing_hypotheses() {
+bool Examination::try_standing_hypotheses(double longer_than) {
   const LidarWay way = lidar_way();
   if (way.empty()) return false;
   const GyroPath path = gyro();
@@ -17,28 +41,27 @@ bool Examination::try_standing_hypotheses() {
     if (leg_mend_) both = joined(*leg_mend_, both);
     return standing_time(recorded_, robot_, &both, way, path, leg_offset_);
   };
-  const auto worth = [](const std::array<double, 2>& s) { return s[0] + s[1]; };
-  const std::array<double, 2> described = stands(nullptr);
-  constexpr double clearly = 1.3, least = 2, balance = 0.4;  // -, s, -
-  double most = clearly * worth(described) + least;
+  const Standing described = stands(nullptr);
+  double most = std::max(longer_than, clearly * described.both() + least_standing);
   std::vector<LegHypothesis> all = leg_hypotheses(recorded_, robot_);
-  if (worth(described) < least) {
+  if (described.both() < least_standing) {
     for (LegHypothesis& h : gross_leg_hypotheses(recorded_, robot_)) all.push_back(std::move(h));
   }
   const std::size_t joints = all.size();
   // A link above an ankle that hardly turns stands nearly as well: only a link that stands far better.
   for (LegHypothesis& h : foot_link_hypotheses(robot_)) all.push_back(std::move(h));
   const LegHypothesis* best = nullptr;
-  std::array<double, 2> then{};
+  Standing then;
   for (const LegHypothesis& h : all) {
     if (static_cast<std::size_t>(&h - all.data()) == joints) {
       if (best != nullptr) break;
-      most = 2 * worth(described) + least;
+      most = std::max(longer_than, 2 * described.both() + least_standing);
     }
-    if (h.culprit != Sensor::legs) continue;
-    const std::array<double, 2> s = stands(&h);
-    if (worth(s) <= most || std::min(s[0], s[1]) < balance * std::max(s[0], s[1])) continue;
-    most = worth(s);
+    // The turning tells the link of the IMU better, if it tells anything.
+    if (h.culprit != Sensor::legs && (legs_.known || turns_with_link(h))) continue;
+    const Standing s = stands(&h);
+    if (s.both() <= most || !s.balanced()) continue;
+    most = s.both();
     then = s;
     best = &h;
   }
@@ -46,7 +69,7 @@ bool Examination::try_standing_hypotheses() {
   Finding f{best->culprit, best->cause, best->name, {}, best->setting, 0, {}, {}, true};
   f.evidence =
       fmt::format("by the LiDAR's way the soles stand for {:.1f} and {:.1f} s of the walk then, for {:.1f} and {:.1f} s as described",
-                  then[0], then[1], described[0], described[1]);
+                  then.of[0], then.of[1], described.of[0], described.of[1]);
   for (const auto& [key, value] : best->changes) f.changes.push_back({key, value});
   find(std::move(f));
   leg_mend_ = leg_mend_ ? joined(*leg_mend_, *best) : *best;
@@ -58,8 +81,10 @@ bool Examination::feet_stand() const {
   const LidarWay way = lidar_way();
   if (way.empty()) return false;
   constexpr double still = 0.002, near = 0.09;  // m, rad
-  const StanceFit fit = fit_stances(recorded_, robot_, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(), leg_offset_);
-  return fit.good && fit.moved < still && (fit.R_link_imu * robot_.imu.T_link_imu.R.inverse()).Log().norm() < near;
+  Robot start = robot_;
+  if (leg_start_) start.imu.T_link_imu.R = *leg_start_;
+  const StanceFit fit = fit_stances(recorded_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(), leg_offset_);
+  return fit.good && fit.moved < still && (leg_start_ || (fit.R_link_imu * robot_.imu.T_link_imu.R.inverse()).Log().norm() < near);
 }
 
 }  // namespace kilvo::lab

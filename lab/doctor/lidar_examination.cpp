@@ -186,7 +186,7 @@ void Examination::examine_lidar_rotation() {
           : note        ? Check::Verdict::note
                         : Check::Verdict::good,
           detail + (note ? ": could be calibrated" : ""));
-    if (angle < rotation_tolerance) return;  // else: not sure, but the likeliest
+    open_ |= angle > rotation_tolerance;
     return;
   }
   // Points that are mirrored turn as those of a LiDAR that is turned by half a turn do; their way differs.

@@ -5,6 +5,7 @@
 
 #include "lab/doctor/leg_hypotheses.hpp"
 #include "lab/doctor/robust_fit.hpp"
+#include "lab/doctor/turns.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -55,7 +56,7 @@ class Stances {
     const std::vector<LegPose> path = leg_path(recorded, robot, hypothesis, period, nullptr);
     const auto n = static_cast<Eigen::Index>(joints_.size());
     for (const LegPose& pose : path) {
-      if (!way.at(pose.t + offset - slack, gyro) || !way.at(pose.t + offset + slack, gyro)) continue;
+      if (with_zeros && (!way.at(pose.t + offset - slack, gyro) || !way.at(pose.t + offset + slack, gyro))) continue;
       Sample s{pose.t, {}};
       for (std::size_t f = 0; f < 2; ++f)
         s.sole[f] = {middle_of(pose.foot[f]), pose.foot[f].R_IF, Eigen::MatrixXd::Zero(3, n), Eigen::MatrixXd::Zero(3, n)};
@@ -74,13 +75,25 @@ class Stances {
     return std::max(1.0, samples / (2 * static_cast<double>(stances_.size())));
   }
 
-  std::array<double, 2> standing() {
+  Standing standing() {
     find(Eigen::VectorXd::Zero(unknowns()), false);
-    std::array<double, 2> out{};
+    Standing out;
+    std::vector<double> moving(samples_.size(), 0);
+    for (std::size_t i = 1; i < samples_.size(); ++i) {
+      if (moves(i)) moving[i] = std::min(samples_[i].t - samples_[i - 1].t, 2 * period);
+      out.moving += moving[i];
+    }
     for (const Stance& s : stances_) {
-      for (std::size_t i = s.begin + 1; i < s.end; ++i) out[s.foot] += moves(i) ? samples_[i].t - samples_[i - 1].t : 0;
+      for (std::size_t i = s.begin + 1; i < s.end; ++i) out.of[s.foot] += moving[i];
     }
     return out;
+  }
+
+  /// With another clock and another mount.
+  Standing standing(double offset, const SO3& R_link_imu) {
+    offset_ = offset;
+    T_LI_.R = R_link_imu;
+    return standing();
   }
 
   /// Where the soles seem to stand with these values.
@@ -222,9 +235,25 @@ StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHyp
   return out;
 }
 
-std::array<double, 2> standing_time(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
-                                    const GyroPath& gyro, double offset) {
+Standing standing_time(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+                       const GyroPath& gyro, double offset) {
   return Stances(recorded, robot, hypothesis, way, gyro, offset, false).standing();
+}
+
+LegStart longest_standing(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+                          const GyroPath& gyro, double reach) {
+  const SO3 described = robot.imu.T_link_imu.R;
+  Stances stances(recorded, robot, hypothesis, way, gyro, 0, false);
+  LegStart best;
+  const auto attempt = [&](double offset, const SO3& R) {
+    const Standing s = stances.standing(offset, R);
+    if (s.both() > best.standing.both()) best = {offset, R, s};
+  };
+  constexpr double step = 0.02;  // s, which the fit of the stances bridges
+  const int steps = static_cast<int>(reach / step);
+  for (int k = -steps; k <= steps; ++k) attempt(k * step, described);
+  for (const Eigen::Matrix3d& turn : rotations_of_a_cube()) attempt(0, SO3::nearest(turn * described.matrix()));
+  return best;
 }
 
 }  // namespace kilvo::lab

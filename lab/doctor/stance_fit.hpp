@@ -3,6 +3,8 @@
 // over all stances, with priors, robust weights and a covariance from the scatter of the stances.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -27,8 +29,27 @@ struct StanceFit {
 StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
                       const GyroPath& gyro, double offset);
 
-/// s, by foot, in which a sole stands while the robot moves. Legs that are described wrongly hardly ever stand.
-std::array<double, 2> standing_time(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
-                                    const GyroPath& gyro, double offset);
+struct Standing {
+  std::array<double, 2> of{};  // s, by foot, in which its sole stands while the robot moves
+  double moving = 0;           // s, in which the robot moves
+  double both() const { return of[0] + of[1]; }
+  /// A robot that walks stands on either foot.
+  bool balanced() const { return std::min(of[0], of[1]) > 0.4 * std::max(of[0], of[1]); }
+};
+
+/// Legs that are described wrongly hardly ever stand.
+Standing standing_time(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+                       const GyroPath& gyro, double offset);
+
+struct LegStart {
+  double offset = 0;  // s: the legs' stamps plus this are on the IMU's clock
+  SO3 R_link_imu;
+  Standing standing;
+};
+
+/// The offset within `reach` (s) and the mount of the IMU, of those that are right angles away from the described one, under which the
+/// soles stand longest.
+LegStart longest_standing(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+                          const GyroPath& gyro, double reach = 1.3);
 
 }  // namespace kilvo::lab

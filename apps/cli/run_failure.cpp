@@ -1,0 +1,22 @@
+#include "apps/cli/run_failure.hpp"
+
+namespace kilvo::cli {
+
+std::string failure_of(const RunSummary& run_summary, const Estimator& estimator, bool with_lidar) {
+  if (run_summary.outputs() == 0) {
+    const std::string why = estimator.waiting_for();
+    return "nothing was estimated: " + (why.empty() ? "no measurements" : "still " + why);
+  }
+  if (estimator.statistics().epochs > 1)
+    return "the recording's time goes back by more than 2 s: what follows is another recording, and is not in the results (--start and "
+           "--duration choose a part)";
+  if (!run_summary.absurdity().empty()) return "diverged: " + run_summary.absurdity();
+  for (const Event& event : estimator.statistics().events) {
+    if (event.reason == Reason::diverged) return "diverged: " + event.detail;
+  }
+  const bool legs_used = estimator.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
+  if (with_lidar && run_summary.sweeps() == 0 && !legs_used) return "no LiDAR scan could be used";
+  return "";
+}
+
+}  // namespace kilvo::cli
