@@ -22,7 +22,7 @@ bool spoils(const Finding& finding) {
       "imu_axes",   "imu_rotated",          "gyro_unit",      "joint_unit",       "joints_swapped", "joint_names_shifted",
       "joint_sign", "point_times_reversed", "lidar_inverted", "lidar_unit",       "imu_link",       "joint_offset",
       "lidar_axes", "accel_gravity",        "urdf",           "point_times_unit", "lidar_position"};
-  constexpr double lidar_turn = 1.5, imu_turn = 10, time = 0.08;  // degrees, s
+  constexpr double lidar_turn = 3, imu_turn = 10, time = 0.08;  // degrees, s
   if (std::ranges::find(always, finding.cause) != always.end()) return true;
   if (finding.cause == "accel_unit") return finding.fatal;
   if (finding.cause == "lidar_rotation") return finding.size > lidar_turn;

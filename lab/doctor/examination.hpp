@@ -67,6 +67,7 @@ class Examination {
   bool legs_turned() const;
   bool feet_stand() const;
   bool find_leg_start();
+  std::vector<SO3> upright_mounts() const;
   /// Only those that stand longer than so many seconds.
   bool try_standing_hypotheses(double longer_than = 0);
   struct LegScore {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fmt/core.h>
 #include <regex>
+#include <sstream>
 
 namespace kilvo::lab {
 namespace {
@@ -38,6 +39,20 @@ LegHypothesis shifted(const std::vector<std::size_t>& joints, int by) {
     for (int i = 0; i < n; ++i) names[joints[static_cast<std::size_t>((i + by + n) % n)]] = old[joints[static_cast<std::size_t>(i)]];
   };
   return h;
+}
+
+// The places of all joints, by a factor.
+std::string scaled(const std::string& urdf, double factor) {
+  const std::regex pattern("(<origin[^>]*xyz\\s*=\\s*\")([^\"]*)\"");
+  std::string out;
+  auto from = urdf.cbegin();
+  for (std::sregex_iterator it(urdf.begin(), urdf.end(), pattern), end; it != end; ++it) {
+    out.append(from, (*it)[2].first);
+    std::istringstream numbers((*it)[2].str());
+    for (double x = 0; numbers >> x;) out += fmt::format("{} ", factor * x);
+    from = (*it)[2].second;
+  }
+  return out.append(from, urdf.cend());
 }
 
 // Two neighbours exchanged in each leg.
@@ -219,6 +234,22 @@ std::vector<LegHypothesis> foot_link_hypotheses(const Robot& robot) {
       r.feet[0].link = left;
       r.feet[1].link = right;
     };
+    out.push_back(h);
+  }
+  return out;
+}
+
+std::vector<LegHypothesis> size_hypotheses() {
+  std::vector<LegHypothesis> out;
+  constexpr double step = 1.16;  // a tenth of the length still seems to stand
+  for (int k = -6; k <= 6; ++k) {
+    if (k == 0) continue;
+    const double factor = std::pow(step, k);
+    LegHypothesis h;
+    h.cause = "leg_lengths";
+    h.name = fmt::format("the robot of the URDF is too {}: one of {:.2f} times its size would fit", k > 0 ? "small" : "large", factor);
+    h.setting = "robot.urdf: its lengths, in metres, or the URDF of this robot";
+    h.robot = [factor](Robot& r) { r.urdf = scaled(r.urdf, factor); };
     out.push_back(h);
   }
   return out;

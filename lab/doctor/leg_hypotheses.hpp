@@ -20,7 +20,9 @@ LegHypothesis degrees_hypothesis();
 /// Both, the first one first.
 LegHypothesis joined(const LegHypothesis& a, const LegHypothesis& b);
 
-/// Links and joints of a URDF, in the order of the document.
+/// A robot of another size: all distances between its joints by one factor, 0.4 to 2.5.
+std::vector<LegHypothesis> size_hypotheses();
+
 /// The soles on other links of both legs.
 std::vector<LegHypothesis> foot_link_hypotheses(const Robot& robot);
 std::vector<std::string> link_names(const std::string& urdf);

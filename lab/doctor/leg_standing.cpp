@@ -1,6 +1,7 @@
 // Feet that stand, by the LiDAR's way: which description of the legs lets them.
 #include <algorithm>
 #include <fmt/core.h>
+#include <numbers>
 
 #include "lab/doctor/examination.hpp"
 #include "lab/doctor/leg_hypotheses.hpp"
@@ -13,7 +14,7 @@ constexpr double clearly = 1.3, least_standing = 2;
 
 }  // namespace
 
-// The clock of the legs, or a mount of the IMU that is right angles away, under which the feet stand as they do under no other description
+// The clock of the legs, or a mount of the IMU about the vertical, under which the feet stand as they do under no other description
 // of the legs: from there the fit of the stances finds both. The turning alone does not tell them on soles that roll.
 bool Examination::find_leg_start() {
   const LidarWay way = lidar_way();
@@ -22,13 +23,30 @@ bool Examination::find_leg_start() {
   const LegHypothesis* mend = leg_mend_ ? &*leg_mend_ : nullptr;
   const Standing described = standing_time(recorded_, robot_, mend, way, path, 0);
   constexpr double enough = 0.1;  // of the time in which the robot moves: soles that seem to stand by chance do so for a hundredth of it
-  if (described.balanced() && described.both() > enough * described.moving) return false;
-  const LegStart start = longest_standing(recorded_, robot_, mend, way, path);
-  if (start.standing.both() < clearly * described.both() + least_standing) return false;
-  if (try_standing_hypotheses(start.standing.both())) return true;
+  if (described.worth() > enough * described.moving) return false;
+  const LegStart start = longest_standing(recorded_, robot_, mend, way, path, upright_mounts());
+  if (start.standing.worth() < clearly * described.worth() + least_standing) return false;
+  if (try_standing_hypotheses(start.standing.worth())) return true;
   leg_offset_ = start.offset;
   leg_start_ = start.R_link_imu;
   return true;
+}
+
+// Mounts under which gravity points from the hips to the feet, all around the vertical.
+std::vector<SO3> Examination::upright_mounts() const {
+  const SO3 described = robot_.imu.T_link_imu.R;
+  Eigen::Vector3d up_link = Eigen::Vector3d::Zero(), force = Eigen::Vector3d::Zero();
+  for (const LegPose& pose : legs_under(nullptr)) {
+    for (const FootPose& foot : pose.foot) up_link -= foot.p[0];
+  }
+  for (const InertialSample& s : recorded_.imu) force += accel_axes_ * s.accel;
+  std::vector<SO3> out;
+  if (!(up_link.norm() > 0 && force.norm() > 0)) return out;
+  up_link.normalize();
+  const SO3 upright = SO3::from_quaternion(Eigen::Quaterniond::FromTwoVectors(described * force, up_link)) * described;
+  constexpr int mounts = 36;
+  for (int k = 0; k < mounts; ++k) out.push_back(SO3::Exp(2 * std::numbers::pi * k / mounts * up_link) * upright);
+  return out;
 }
 
 // Whatever turns as the gyro does may still not stand: joints of parallel axes exchanged, legs exchanged, soles on another link.
@@ -42,10 +60,11 @@ bool Examination::try_standing_hypotheses(double longer_than) {
     return standing_time(recorded_, robot_, &both, way, path, leg_offset_);
   };
   const Standing described = stands(nullptr);
-  double most = std::max(longer_than, clearly * described.both() + least_standing);
+  double most = std::max(longer_than, clearly * described.worth() + least_standing);
   std::vector<LegHypothesis> all = leg_hypotheses(recorded_, robot_);
-  if (described.both() < least_standing) {
+  if (described.worth() < least_standing) {
     for (LegHypothesis& h : gross_leg_hypotheses(recorded_, robot_)) all.push_back(std::move(h));
+    for (LegHypothesis& h : size_hypotheses()) all.push_back(std::move(h));
   }
   const std::size_t joints = all.size();
   // A link above an ankle that hardly turns stands nearly as well: only a link that stands far better.
@@ -55,13 +74,13 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   for (const LegHypothesis& h : all) {
     if (static_cast<std::size_t>(&h - all.data()) == joints) {
       if (best != nullptr) break;
-      most = std::max(longer_than, 2 * described.both() + least_standing);
+      most = std::max(longer_than, 2 * described.worth() + least_standing);
     }
     // The turning tells the link of the IMU better, if it tells anything.
     if (h.culprit != Sensor::legs && (legs_.known || turns_with_link(h))) continue;
     const Standing s = stands(&h);
-    if (s.both() <= most || !s.balanced()) continue;
-    most = s.both();
+    if (s.worth() <= most) continue;
+    most = s.worth();
     then = s;
     best = &h;
   }

@@ -5,7 +5,6 @@
 
 #include "lab/doctor/leg_hypotheses.hpp"
 #include "lab/doctor/robust_fit.hpp"
-#include "lab/doctor/turns.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -241,18 +240,18 @@ Standing standing_time(const Recorded& recorded, const Robot& robot, const LegHy
 }
 
 LegStart longest_standing(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
-                          const GyroPath& gyro, double reach) {
+                          const GyroPath& gyro, const std::vector<SO3>& mounts, double reach) {
   const SO3 described = robot.imu.T_link_imu.R;
   Stances stances(recorded, robot, hypothesis, way, gyro, 0, false);
   LegStart best;
   const auto attempt = [&](double offset, const SO3& R) {
     const Standing s = stances.standing(offset, R);
-    if (s.both() > best.standing.both()) best = {offset, R, s};
+    if (s.worth() > best.standing.worth()) best = {offset, R, s};
   };
   constexpr double step = 0.02;  // s, which the fit of the stances bridges
   const int steps = static_cast<int>(reach / step);
   for (int k = -steps; k <= steps; ++k) attempt(k * step, described);
-  for (const Eigen::Matrix3d& turn : rotations_of_a_cube()) attempt(0, SO3::nearest(turn * described.matrix()));
+  for (const SO3& mount : mounts) attempt(0, mount);
   return best;
 }
 

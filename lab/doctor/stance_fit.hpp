@@ -32,9 +32,8 @@ StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHyp
 struct Standing {
   std::array<double, 2> of{};  // s, by foot, in which its sole stands while the robot moves
   double moving = 0;           // s, in which the robot moves
-  double both() const { return of[0] + of[1]; }
-  /// A robot that walks stands on either foot.
-  bool balanced() const { return std::min(of[0], of[1]) > 0.4 * std::max(of[0], of[1]); }
+  /// s: a robot that walks stands on either foot, so that one alone counts little.
+  double worth() const { return std::min(of[0] + of[1], 4 * std::min(of[0], of[1])); }
 };
 
 /// Legs that are described wrongly hardly ever stand.
@@ -47,9 +46,9 @@ struct LegStart {
   Standing standing;
 };
 
-/// The offset within `reach` (s) and the mount of the IMU, of those that are right angles away from the described one, under which the
-/// soles stand longest.
+/// The offset within `reach` (s) with the described mount of the IMU, or the one of `mounts` without an offset, under which the soles stand
+/// longest.
 LegStart longest_standing(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
-                          const GyroPath& gyro, double reach = 1.3);
+                          const GyroPath& gyro, const std::vector<SO3>& mounts, double reach = 1.3);
 
 }  // namespace kilvo::lab

@@ -64,25 +64,6 @@ double robust_share(std::vector<double>& errors, std::vector<double>& sizes) {
 
 }  // namespace
 
-std::array<Eigen::Matrix3d, 24> rotations_of_a_cube() {
-  std::array<Eigen::Matrix3d, 24> out;
-  std::size_t n = 0;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      if (i == j) continue;
-      for (const double a : {1.0, -1.0}) {
-        for (const double b : {1.0, -1.0}) {
-          Eigen::Matrix3d& R = out[n++];
-          R.col(0) = a * Eigen::Vector3d::Unit(i);
-          R.col(1) = b * Eigen::Vector3d::Unit(j);
-          R.col(2) = R.col(0).cross(R.col(1));
-        }
-      }
-    }
-  }
-  return out;
-}
-
 double explained_by(const std::vector<Turn>& turns, const GyroPath& gyro, double offset, const Eigen::Matrix3d& axes, double scale) {
   std::vector<double> errors, sizes;
   for (const Pair& p : pairs_of(turns, gyro, offset)) {

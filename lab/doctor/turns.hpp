@@ -1,7 +1,6 @@
 // How a sensor turned, interval by interval, held against the gyro: from that follow its mount's rotation, its clock and the gyro's axes.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -31,9 +30,6 @@ struct TurnAgreement {
 
 /// The best orthogonal matrix between sensor and gyro when the sensor's clock is `offset` behind.
 TurnAgreement agree(const std::vector<Turn>& turns, const GyroPath& gyro, double offset);
-
-/// Those that take its edges to its edges.
-std::array<Eigen::Matrix3d, 24> rotations_of_a_cube();
 
 /// The share explained with these axes, as they are.
 double explained_by(const std::vector<Turn>& turns, const GyroPath& gyro, double offset, const Eigen::Matrix3d& axes, double scale = 1);
