@@ -60,7 +60,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
     return standing_time(recorded_, robot_, &both, way, path, leg_offset_);
   };
   const Standing described = stands(nullptr);
-  double most = std::max(longer_than, clearly * described.worth() + least_standing);
+  double most = std::max(longer_than, clearly * described.worth() + least_standing), longer = clearly * described.both();
   std::vector<LegHypothesis> all = leg_hypotheses(recorded_, robot_);
   if (described.worth() < least_standing) {
     for (LegHypothesis& h : gross_leg_hypotheses(recorded_, robot_)) all.push_back(std::move(h));
@@ -74,12 +74,12 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   for (const LegHypothesis& h : all) {
     if (static_cast<std::size_t>(&h - all.data()) == joints) {
       if (best != nullptr) break;
-      most = std::max(longer_than, 2 * described.worth() + least_standing);
+      longer = 2 * described.both() + least_standing;
     }
     // The turning tells the link of the IMU better, if it tells anything.
     if (h.culprit != Sensor::legs && (legs_.known || turns_with_link(h))) continue;
     const Standing s = stands(&h);
-    if (s.worth() <= most) continue;
+    if (s.worth() <= most || s.both() <= longer) continue;
     most = s.worth();
     then = s;
     best = &h;

@@ -32,8 +32,9 @@ StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHyp
 struct Standing {
   std::array<double, 2> of{};  // s, by foot, in which its sole stands while the robot moves
   double moving = 0;           // s, in which the robot moves
+  double both() const { return of[0] + of[1]; }
   /// s: a robot that walks stands on either foot, so that one alone counts little.
-  double worth() const { return std::min(of[0] + of[1], 4 * std::min(of[0], of[1])); }
+  double worth() const { return std::min(both(), 4 * std::min(of[0], of[1])); }
 };
 
 /// Legs that are described wrongly hardly ever stand.
