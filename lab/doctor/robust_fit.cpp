@@ -15,29 +15,37 @@ double squared_length(const Residuals& r, std::size_t group) {
   return sum;
 }
 
-// Information and gradient, and the gradient of each block.
+// Information and gradient.
 struct Normal {
-  Eigen::MatrixXd H, meat;
+  Eigen::MatrixXd H;
   Eigen::VectorXd g;
+  explicit Normal(Eigen::Index n) : H(Eigen::MatrixXd::Zero(n, n)), g(Eigen::VectorXd::Zero(n)) {}
 };
 
-Normal sum_up(const Residuals& at, const std::vector<Residuals>& moved, const Eigen::VectorXd& step, double scale) {
+// By block.
+std::vector<Normal> sum_up(const Residuals& at, const std::vector<Residuals>& moved, const Eigen::VectorXd& step, double scale) {
   const auto n = step.size();
   const auto width = static_cast<std::size_t>(at.width);
-  Normal out{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
-  Eigen::VectorXd block = Eigen::VectorXd::Zero(n), J(n);
+  std::vector<Normal> out;
+  Eigen::VectorXd J(n);
   for (std::size_t k = 0; k < at.groups(); ++k) {
+    if (k == 0 || at.block[k] != at.block[k - 1]) out.emplace_back(n);
     const double weight = 1 / (1 + squared_length(at, k) / (static_cast<double>(width) * 4 * scale * scale));
     for (std::size_t i = k * width; i < (k + 1) * width; ++i) {
       for (Eigen::Index j = 0; j < n; ++j) J[j] = (moved[static_cast<std::size_t>(j)].r[i] - at.r[i]) / step[j];
-      out.H += weight * J * J.transpose();
-      block += weight * at.r[i] * J;
+      out.back().H += weight * J * J.transpose();
+      out.back().g += weight * at.r[i] * J;
     }
-    if (k + 1 == at.groups() || at.block[k + 1] != at.block[k]) {
-      out.g += block;
-      out.meat += block * block.transpose();
-      block.setZero();
-    }
+  }
+  return out;
+}
+
+// What leaving out each block in turn would change: the jackknife. A few blocks that fit themselves do not look sure by it.
+Eigen::MatrixXd scatter(const std::vector<Normal>& blocks, const Eigen::MatrixXd& H) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(H.rows(), H.cols());
+  for (const Normal& b : blocks) {
+    const Eigen::VectorXd change = (H - b.H).ldlt().solve(b.g);
+    out += change * change.transpose();
   }
   return out;
 }
@@ -71,7 +79,6 @@ Fit robust_fit(const ResidualFunction& residuals, const Eigen::VectorXd& start, 
   const Eigen::VectorXd prior = prior_sigma.array().square().inverse();
   Residuals at;
   std::vector<Residuals> moved(static_cast<std::size_t>(n));
-  Normal normal;
   for (int k = 0; k <= iterations; ++k) {
     at.clear();
     residuals(out.x, at);
@@ -85,14 +92,15 @@ Fit robust_fit(const ResidualFunction& residuals, const Eigen::VectorXd& start, 
       residuals(x, there);
       if (there.groups() != at.groups()) return out;
     }
-    normal = sum_up(at, moved, step, out.scale);
+    const std::vector<Normal> blocks = sum_up(at, moved, step, out.scale);
     const double s2 = out.scale * out.scale;
-    const Eigen::MatrixXd H = normal.H + Eigen::MatrixXd((s2 * prior).asDiagonal());
-    const Eigen::VectorXd g = normal.g + s2 * prior.cwiseProduct(out.x - start);
+    Eigen::MatrixXd H = (s2 * prior).asDiagonal();
+    Eigen::VectorXd g = s2 * prior.cwiseProduct(out.x - start);
+    for (const Normal& b : blocks) H += b.H, g += b.g;
     const Eigen::MatrixXd inverse = H.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
     if (k == iterations) {
       const Eigen::MatrixXd prior_meat = s2 * s2 * Eigen::MatrixXd(prior.asDiagonal());
-      out.cov = inverse * (normal.meat + prior_meat) * inverse;
+      out.cov = inverse * prior_meat * inverse + scatter(blocks, H);
       out.good = out.x.allFinite() && out.cov.allFinite();
       break;
     }
