@@ -231,7 +231,7 @@ class Run {
 
   void tell_end() const {
     const RunSummary& run_summary = files_.run_summary();
-    const std::vector<std::string> warnings = all_warnings(facts_, source_, estimator_.statistics());
+    const auto warnings = facts_.sensors.empty() ? facts_.warnings : all_warnings(facts_, source_, estimator_.statistics());
     for (const std::string& text : warnings) fmt::print(stderr, "kilvo: warning: {}\n", text);
     if (!warnings.empty() && !options_.quiet) fmt::print(stderr, "kilvo: what to do about warnings: docs/troubleshooting.md\n");
     if (!facts_.failure.empty()) fmt::print(stderr, "kilvo: error: {}\n", facts_.failure);
