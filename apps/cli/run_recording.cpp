@@ -291,8 +291,8 @@ int run_recording(const RunOptions& options) {
   }
   // No trajectory leaves that a wrong description has spoilt: what is left estimates anew, from the beginning.
   facts.sensors = without_spoiled(choice.used, wrong);
-  if (!options.quiet)
-    fmt::print(stderr, "kilvo: {}\n", facts.sensors.empty() ? "nothing is left to estimate with" : "the run begins anew with what is left");
+  remove_results(options.out);
+  if (!options.quiet) fmt::print(stderr, "kilvo: the run begins anew with what is left\n");
   if (!facts.sensors.empty()) choice.used = facts.sensors;
   return *Run(options, interrupt, settings, choice, facts, std::move(wrong)).all();
 }

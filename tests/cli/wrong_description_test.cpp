@@ -1,4 +1,5 @@
 // kilvo run with a description that the data contradict: no trajectory is left that it has spoilt.
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/story.hpp"
@@ -48,6 +49,7 @@ TEST_F(WrongDescription, OfTheImuOnTheRobotLeavesTheResultsOfTheLidar) {
   const Finished f = run("imu,legs,lidar", "imu.T_link_imu.R=[1, 0, 0, 0, 0, -1, 0, 1, 0]");
   EXPECT_EQ(f.code, 1);
   EXPECT_THAT(f.err, HasSubstr("; the results are of imu, lidar alone"));
+  EXPECT_FALSE(std::filesystem::exists(out_ + "/contacts.csv")) << "of the run before";
   const Finished eval = kilvo({"eval", out_ + "/sweeps.tum", walk_ + "/gt.tum", "--json"});
   ASSERT_EQ(eval.code, 0) << eval.err;
   EXPECT_LT(nlohmann::json::parse(eval.out).at("ate_rmse_m").get<double>(), 0.0015);
