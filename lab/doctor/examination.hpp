@@ -52,6 +52,7 @@ class Examination {
   void accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence);
   /// `only_calm`: none when what the accelerometer measures does not average to gravity.
   std::optional<double> tilt_under(const SO3& R_link_imu, bool only_calm) const;
+  Eigen::Vector3d up_by_legs() const;
   void examine_upright();
   void blame_imu_for_all();
   // lidar_examination.cpp

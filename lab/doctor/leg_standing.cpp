@@ -35,10 +35,7 @@ bool Examination::find_leg_start() {
 // Mounts under which gravity points from the hips to the feet, all around the vertical.
 std::vector<SO3> Examination::upright_mounts() const {
   const SO3 described = robot_.imu.T_link_imu.R;
-  Eigen::Vector3d up_link = Eigen::Vector3d::Zero(), force = Eigen::Vector3d::Zero();
-  for (const LegPose& pose : legs_under(nullptr)) {
-    for (const FootPose& foot : pose.foot) up_link -= foot.p[0];
-  }
+  Eigen::Vector3d up_link = up_by_legs(), force = Eigen::Vector3d::Zero();
   for (const InertialSample& s : recorded_.imu) force += accel_axes_ * s.accel;
   std::vector<SO3> out;
   if (!(up_link.norm() > 0 && force.norm() > 0)) return out;

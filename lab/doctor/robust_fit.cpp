@@ -40,16 +40,6 @@ std::vector<Normal> sum_up(const Residuals& at, const std::vector<Residuals>& mo
   return out;
 }
 
-// What leaving out each block in turn would change: the jackknife. A few blocks that fit themselves do not look sure by it.
-Eigen::MatrixXd scatter(const std::vector<Normal>& blocks, const Eigen::MatrixXd& H) {
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(H.rows(), H.cols());
-  for (const Normal& b : blocks) {
-    const Eigen::VectorXd change = (H - b.H).ldlt().solve(b.g);
-    out += change * change.transpose();
-  }
-  return out;
-}
-
 }  // namespace
 
 double Fit::sigma(int i) const { return good ? std::sqrt(std::max(cov(i, i), 0.0)) : INFINITY; }
@@ -100,7 +90,7 @@ Fit robust_fit(const ResidualFunction& residuals, const Eigen::VectorXd& start, 
     const Eigen::MatrixXd inverse = H.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
     if (k == iterations) {
       const Eigen::MatrixXd prior_meat = s2 * s2 * Eigen::MatrixXd(prior.asDiagonal());
-      out.cov = inverse * prior_meat * inverse + scatter(blocks, H);
+      out.cov = inverse * prior_meat * inverse + jackknife(blocks, H);
       out.good = out.x.allFinite() && out.cov.allFinite();
       break;
     }

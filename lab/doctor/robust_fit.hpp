@@ -3,6 +3,7 @@
 // to cluster-robust inference", 2015.
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <functional>
 #include <vector>
@@ -42,5 +43,17 @@ double scale_of(const Residuals& r);
 
 /// Mean over groups of log(1 + |r|^2 / (width s^2)).
 double cost_of(const Residuals& r, double scale);
+
+/// What leaving out each block in turn would change: the jackknife. A few blocks that fit themselves do not look sure by it. Each block has
+/// its information `H` and its gradient `g`; `H`: of all blocks and the prior.
+template <class Blocks, class Matrix>
+Matrix jackknife(const Blocks& blocks, const Matrix& H) {
+  Matrix out = Matrix::Zero(H.rows(), H.cols());
+  for (const auto& b : blocks) {
+    const auto change = (H - b.H).ldlt().solve(b.g).eval();
+    out += change * change.transpose();
+  }
+  return out;
+}
 
 }  // namespace kilvo::lab

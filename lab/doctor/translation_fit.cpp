@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "lab/doctor/robust_fit.hpp"
 #include "lab/doctor/turns.hpp"
 
 namespace kilvo::lab {
@@ -62,16 +63,6 @@ struct Block {
   Matrix9 H = Matrix9::Zero();
   Vector9 g = Vector9::Zero();
 };
-
-// What leaving out each block in turn would change: the jackknife. A few blocks that fit themselves do not look sure by it.
-Matrix9 scatter(const std::vector<Block>& blocks, const Matrix9& H) {
-  Matrix9 out = Matrix9::Zero();
-  for (const Block& b : blocks) {
-    const Vector9 change = (H - b.H).ldlt().solve(b.g);
-    out += change * change.transpose();
-  }
-  return out;
-}
 
 }  // namespace
 
@@ -135,7 +126,7 @@ std::optional<TranslationFit> TranslationRows::fit(const Eigen::Matrix3d& axes) 
     Matrix9 H = H_prior;
     for (const Block& b : blocks) H += b.H;
     const Matrix9 inverse = H.ldlt().solve(Matrix9::Identity());
-    out.cov = scale * scale * inverse * H_prior * inverse + scatter(blocks, H);
+    out.cov = scale * scale * inverse * H_prior * inverse + jackknife(blocks, H);
     x = inverse * g;
     const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
     std::ranges::nth_element(lengths, middle);

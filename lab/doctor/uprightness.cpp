@@ -12,15 +12,20 @@ constexpr double gravity = 9.80665;  // m/s^2
 
 }  // namespace
 
+// From the feet to the hips, of any length.
+Eigen::Vector3d Examination::up_by_legs() const {
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  for (const LegPose& pose : legs_under(nullptr)) {
+    for (const FootPose& foot : pose.foot) up -= foot.p[0];
+  }
+  return up;
+}
+
 // Degrees between gravity by the accelerometer and the direction from the feet to the hips, the least of three parts of the recording: what
 // impacts add, sampled without a filter, differs from part to part.
 std::optional<double> Examination::tilt_under(const SO3& R_link_imu, bool only_calm) const {
   constexpr std::size_t parts = 3;
-  // Up by the legs: from the feet to the hips.
-  Eigen::Vector3d up = Eigen::Vector3d::Zero();
-  for (const LegPose& pose : legs_under(leg_mend_ ? &*leg_mend_ : nullptr)) {
-    for (const FootPose& foot : pose.foot) up -= foot.p[0];
-  }
+  const Eigen::Vector3d up = up_by_legs();
   if (!(up.norm() > 0)) return std::nullopt;
   double least = 180;
   const std::size_t n = recorded_.imu.size() / parts;
