@@ -83,6 +83,8 @@ void add_run(CLI::App& program, Action& chosen) {
   verb->add_flag("--no-map", words->no_map, "write no map");
   verb->add_flag("--mcap", options.mcap, "write DIR/run.mcap too: poses, transforms, contacts, clouds, times, events, for Foxglove");
   verb->add_flag("--no-deskew", options.no_deskew, "take each cloud at its stamp, as if its points had been measured at once");
+  verb->add_flag("--trust-description", options.trust_description,
+                 "do not hold the data against the description, which costs seconds; for runs on a recording that was judged before");
   verb->add_option("--threads", words->threads, "default: all cores; results do not depend on it")
       ->type_name("N")
       ->check(CLI::Range(1, 1024));

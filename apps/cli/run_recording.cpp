@@ -96,7 +96,7 @@ class Run {
  private:
   // Said as soon as the evidence is in; the files get it at the end, where it does not depend on how fast it was judged.
   void hold_against_description(const Measurement& measurement) {
-    if (again_) return;
+    if (again_ || options_.trust_description) return;
     description_.take(measurement);
     for (lab::WrongDescription& wrong : description_.news()) {
       progress_.finish();

@@ -25,7 +25,8 @@ struct RunOptions {
   bool mcap = false;               // out/run.mcap too
   std::optional<double> realtime;  // through the live runner, so many times as fast as it was recorded
   bool no_deskew = false;
-  int threads = 1;  // more than one: reading and the map have their own. The results are the same
+  bool trust_description = false;  // do not hold the first seconds against it
+  int threads = 1;                 // more than one: reading and the map have their own. The results are the same
   bool quiet = false;
 };
 

@@ -28,6 +28,8 @@ void add_simulate(CLI::App& program, Action& chosen) {
       ->type_name("N")
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{1'000'000'000}));
   verb->add_option("--duration", options->duration, "end after so many seconds; default: when the walk ends")->type_name("S");
+  verb->add_option("--sensors", options->sensors, "record only these of legs,imu,lidar,camera, which are as without it; default: all")
+      ->type_name("LIST");
   verb->add_option("--stride", options->stride, "every step so many times as long; default: 1")->type_name("X");
   add_wear_options(*verb, options->wear);
   verb->add_option("--rough", options->rough, "a robot as it is, kept well (1) or badly (2); the description is the nominal one")

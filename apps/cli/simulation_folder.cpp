@@ -6,6 +6,7 @@
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/output_folder.hpp"
 #include "apps/cli/progress.hpp"
+#include "apps/cli/sensor_choice.hpp"
 #include "lab/evaluation/decimal_time.hpp"
 #include "lab/evaluation/trajectory_file.hpp"
 #include "lab/recordings/recording_writer.hpp"
@@ -111,6 +112,10 @@ lab::RoughRobot robot_of(const lab::Scenario& scenario, const SimulationOptions&
   config.seed = static_cast<std::uint64_t>(options.seed);
   config.duration = options.duration.value_or(0);
   config.threads = 0;
+  if (!options.sensors.empty()) {
+    config.use.fill(false);
+    for (const Sensor sensor : parse_sensors(options.sensors)) config.use[static_cast<std::size_t>(sensor)] = true;
+  }
   lab::RoughRobot robot = lab::rough_robot(config, options.rough, parts_of(options));
   apply(options.wear, robot.truth);
   apply(options.wear, robot.known);

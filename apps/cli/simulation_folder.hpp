@@ -19,6 +19,7 @@ struct SimulationOptions {
   WearOptions wear{};              // beside that of the scenario
   int rough = 0;                   // level of lab::rough_robot(); 0: the robot is as it is described
   std::string rough_only{};        // parts of that, with commas between; empty: all
+  std::string sensors{};           // that are recorded, with commas between; empty: all
 };
 
 /// Writes recording.bag, gt.tum, contacts.gt.csv, imu_truth.csv, exposure.csv, robot.urdf and config.yaml into `folder`; of a rough robot

@@ -2,6 +2,7 @@
 import math
 
 MODALITIES = ["LI", "LIV", "KIL", "KILV", "KI"]
+LEVELS = {0: "as described", 1: "kept well"}
 COMPARED = ["KIL", "KILV", "KI", "lost", "recovered"]
 
 # What is changed, by which settings, and what that can change.
@@ -19,6 +20,10 @@ VARIANTS = [("as it is", [], COMPARED), ("scans recut at images", ["lidar.recut=
 
 def millimetres(metres: float) -> str:
     return f"{1e3 * metres:.2f}" if metres < 1 else f"{1e3 * metres:.0f}"
+
+
+def signed(x: float) -> str:
+    return f"{round(x, 1) + 0.0:+.1f}"
 
 
 def geometric_mean(values: list[float]) -> float:
@@ -47,8 +52,9 @@ def by_modality(title: str, results: dict, value, text, note: str = "") -> Table
         row = [name]
         for m in shown:
             of = result["accuracy"].get(m)
-            row.append("-" if of is None else text(value(of)) + (" x" if of["se3"]["diverged"] else ""))
-            if of is not None:
+            known = of is not None and value(of) is not None
+            row.append(text(value(of)) + (" x" if of["se3"]["diverged"] else "") if known else "-")
+            if known:
                 columns[m].append(value(of))
         rows.append(row)
     rows.append(["mean"] + [text(mean(columns[m])) if len(columns[m]) == len(results) else "-" for m in shown])
@@ -59,7 +65,7 @@ def accuracy(results: dict) -> list[Table]:
     out = [by_modality(f"Table III: ATE RMSE after {name} alignment, mm", results, lambda of, a=align: of[a]["ate_rmse_m"], millimetres,
                        "At the sweeps, as the paper's; of KI at every leg sample. x: diverged.")
            for align, name in (("se3", "SE(3)"), ("yaw", "yaw (position and heading)"))]
-    out.append(by_modality("Table III: RTE over 1 m, % of the way", results, lambda of: of["se3"]["rte_1m_percent"] or 0.0, lambda v: f"{v:.3f}"))
+    out.append(by_modality("Table III: RTE over 1 m, % of the way", results, lambda of: of["se3"]["rte_1m_percent"], lambda v: f"{v:.3f}"))
     out.append(by_modality("Table IV: end-to-end translation error, mm", results, lambda of: of["se3"]["e2e_m"], millimetres,
                            "No alignment enters: the true and the estimated displacement, each in its first body frame."))
     out.append(by_modality("Table III: end-to-end error along z, mm", results, lambda of: abs(of["se3"]["e2e_z_m"]), millimetres))
@@ -95,16 +101,32 @@ def times(results: dict) -> list[Table]:
 
 
 def failures(results: dict) -> list[Table]:
-    rows = []
+    rows, more, drifts = [], [], []
     for name, result in results.items():
         f = result["failures"]
         d = f.get("drift")
         way = f"{d['xy']:.2f} / {d['z']:.2f} of {d['way']:.1f} m" if d else "-"
-        rows.append([name, f"{f['undisturbed']:.1f}", f"{f['recovered']:.1f}", f"{f['unrecoverable']:.1f}", way])
+        more.append(f["recovered"] - f["undisturbed"])
+        drifts += [d] if d else []
+        rows.append([name, f"{f['undisturbed']:.1f}", f"{f['recovered']:.1f}", signed(more[-1]), f"{f['unrecoverable']:.1f}", way])
+    largest = " / ".join(f"{max(d[k] for d in drifts):.2f}" for k in ("xy", "z")) if drifts else "-"
+    rows.append(["largest", "", "", signed(max(more)), "", largest])
     return [Table("Failures: end-to-end error of the last output, mm",
-                  ["recording", "undisturbed", "recovered", "not recovered", "drift since the LiDAR was lost, % xy / z"], rows,
+                  ["recording", "undisturbed", "recovered", "more than undisturbed", "not recovered", "drift since the LiDAR was lost, % xy / z"], rows,
                   "The paper's losses at the same shares of the recording. Recovered (robust_h02*): legs 16 to 19 %, LiDAR 40 to 43 %, images 61 to 64 %. "
                   "Not recovered (robust_h01*): images from 63 %, LiDAR from 90 % to the end, in KI.")]
+
+
+def legs_alone(found: list[dict]) -> list[Table]:
+    rows = []
+    for level in sorted({f["level"] for f in found}):
+        of = [f for f in found if f["level"] == level]
+        rows += [[f["walk"], str(f["seed"]), LEVELS[level], f"{f['way']:.1f}", f"{f['xy']:.2f}", f"{f['z']:.2f}"] for f in of]
+        for word, take in (("mean", mean), ("largest", max)):
+            rows.append([word, "", LEVELS[level], "", f"{take([f['xy'] for f in of]):.2f}", f"{take([f['z'] for f in of]):.2f}"])
+    return [Table("Legs and IMU alone (KI) from the start: error at the end, % of the way", ["walk", "seed", "robot", "way, m", "horizontal", "vertical"], rows,
+                  "No scan and no map, ever. As described: the robot is what its description says. Kept well: its legs, mounts, clocks and soles are a little "
+                  "otherwise (`kilvo simulate --rough 1`).")]
 
 
 def degradation(results: dict) -> list[Table]:

@@ -122,6 +122,20 @@ TEST(Simulate, AllThatIsRecordedIsUsedAndItsTimeCounted) {
   EXPECT_THAT(info.out, testing::Not(HasSubstr("not by this version")));
 }
 
+TEST(Simulate, TheSensorsThatAreRecordedAreAsTheyAreAmongAll) {
+  const TemporaryFolder folder;
+  for (const std::string& sensors : {std::string("legs,imu"), std::string("imu,legs,lidar,camera")}) {
+    const std::string walk = folder / sensors;
+    ASSERT_EQ(kilvo({"simulate", "room", "--out", walk, "--seed", "5", "--duration", "5", "--sensors", sensors, "--quiet"}).code, 0);
+    ASSERT_EQ(kilvo({"run", walk, "--sensors", "legs,imu", "--out", walk + "/run", "--quiet", "--no-map"}).code, 0);
+  }
+  EXPECT_EQ(read_text(folder / "legs,imu/run/odometry.tum"), read_text(folder / "imu,legs,lidar,camera/run/odometry.tum"));
+  EXPECT_LT(std::filesystem::file_size(folder / "legs,imu/recording.bag"), 5'000'000U);
+  const Finished f = kilvo({"simulate", "room", "--out", folder / "x", "--sensors", "legs,imv"});
+  EXPECT_EQ(f.code, 2);
+  EXPECT_THAT(f.err, HasSubstr("no sensor 'imv', nearest is 'imu'"));
+}
+
 TEST(Simulate, AWalkGoesThroughTheLiveRunnerAsItWouldOnTheRobot) {
   const TemporaryFolder folder;
   ASSERT_EQ(kilvo({"simulate", "room", "--out", folder / "sim", "--seed", "5", "--duration", "5"}).code, 0);

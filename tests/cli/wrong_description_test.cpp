@@ -37,6 +37,21 @@ TEST_F(WrongDescription, OfTheLidarLeavesTheResultsOfTheLegs) {
   EXPECT_LT(nlohmann::json::parse(eval.out).at("ate_rmse_m").get<double>(), 0.003);
 }
 
+TEST_F(WrongDescription, IsNotJudgedWhereItIsToBeTrusted) {
+  const Finished f =
+      kilvo({"run", walk_, "--sensors", "imu,legs,lidar", "--set", pitched_, "--out", out_, "--quiet", "--no-map", "--trust-description"});
+  EXPECT_THAT(f.err, testing::Not(HasSubstr("the LiDAR is turned")));
+  EXPECT_THAT(result("events.csv"), testing::Not(HasSubstr("description")));
+  EXPECT_THAT(result("sweeps.tum"), HasSubstr("1700000"));
+  // What is right is as it is with it.
+  for (const std::string trust : {"", "--trust-description"}) {
+    std::vector<std::string> words{"run", walk_, "--sensors", "imu,legs,lidar", "--out", out_ + trust, "--quiet", "--no-map"};
+    if (!trust.empty()) words.push_back(trust);
+    ASSERT_EQ(kilvo(words).code, 0);
+  }
+  EXPECT_EQ(result("odometry.tum"), read_text(out_ + "--trust-description/odometry.tum"));
+}
+
 TEST_F(WrongDescription, OfTheOnlySenseLeavesNoResults) {
   const Finished f = run("imu,lidar", pitched_);
   EXPECT_EQ(f.code, 1);

@@ -40,6 +40,21 @@ class Pieces(unittest.TestCase):
         self.assertEqual(first.rows[1][2], "3.17 (x 2.00)")
         self.assertEqual(len(each.rows), 6)
 
+    def test_failures_are_compared_with_the_undisturbed_run(self):
+        def of(undisturbed, recovered, drift=None):
+            return {"failures": {"undisturbed": undisturbed, "recovered": recovered, "unrecoverable": 9.0} | ({"drift": drift} if drift else {})}
+
+        results = {"a": of(1.0, 3.5, {"xy": 0.2, "z": 0.4, "way": 5}), "b": of(4.0, 3.96, {"xy": 0.3, "z": 0.1, "way": 2}), "c": of(2.0, 2.0)}
+        rows = tables.failures(results)[0].rows
+        self.assertEqual(rows[0], ["a", "1.0", "3.5", "+2.5", "9.0", "0.20 / 0.40 of 5.0 m"])
+        self.assertEqual([row[3] for row in rows], ["+2.5", "+0.0", "+0.0", "+2.5"])
+        self.assertEqual(rows[-1][-1], "0.30 / 0.40")
+
+    def test_what_is_not_known_is_no_zero(self):
+        found = {"ate_rmse_m": 0.001, "e2e_m": 0.001, "e2e_z_m": -0.001, "rte_1m_percent": None, "diverged": False}
+        rte = tables.accuracy({"a": {"accuracy": {"KI": {"se3": found, "yaw": found}}}})[2]
+        self.assertEqual(rte.rows, [["a", "-"], ["mean", "-"]])
+
     def test_ticks_are_round_and_inside(self):
         self.assertEqual(figures.ticks(0, 10), [0, 2, 4, 6, 8, 10])
         for low, high in ((-0.013, 0.021), (3, 3.001), (-900, 12000)):
@@ -73,7 +88,8 @@ class PaperRun(unittest.TestCase):
         for part in ("simulating", "contacts", "accuracy", "failures", "degradation", "ablations"):
             self.assertIn(f"room_short: {part}", told)
         text, page = self.read("first", "results.md"), self.read("first", "results.html")
-        for title in ("Table I:", "Table II:", "Table III:", "Table IV:", "Table V:", "Failures", "Degradation from", "Ablations", "(KI)"):
+        for title in ("Table I:", "Table II:", "Table III:", "Table IV:", "Table V:", "Failures", "Degradation from", "Ablations", "(KI)", "(KI) from the start",
+                      "What this page cost"):
             self.assertIn(title, text)
             self.assertIn(title, page)
         accuracy = text[text.index("Table III"):]
@@ -89,6 +105,11 @@ class PaperRun(unittest.TestCase):
         self.assertEqual(set(found["accuracy"]) - {"drift"}, {"LI", "LIV", "KIL", "KILV", "KI"})
         self.assertIn("KI", dict((name, t) for t, name in found["failures"]["modalities"]["unrecoverable"]))
         self.assertIn("LIV", [name for _, name in found["failures"]["modalities"]["recovered"]])
+        # Legs and IMU alone, on walks of their own: three, each of three seeds and two robots.
+        legs = json.loads(self.read("first", "results.json"))["legs"]
+        self.assertEqual(len({(r["walk"], r["seed"], r["level"]) for r in legs}), 18)
+        self.assertTrue(all(r["way"] > 0.3 and r["xy"] < 5 and r["z"] < 10 for r in legs), legs)
+        self.assertTrue(any(r["xy"] != s["xy"] for r in legs for s in legs if (r["walk"], r["seed"]) == (s["walk"], s["seed"])))
         # The same folder, twice; a part of the tables.
         for out in ("second", "third"):
             self.run_it("--out", self.path(out), "--only", "accuracy", "--only", "times", "--only", "paths", "--no-times", self.path("first", "walks"))
@@ -97,6 +118,19 @@ class PaperRun(unittest.TestCase):
                 self.assertEqual(self.read("second", name), self.read("third", name), name)
         self.assertIn(row.group(0), self.read("second", "results.md"))
         self.assertNotIn("Table V", self.read("second", "results.md"))
+
+    def test_a_description_that_is_wrong_is_told_and_all_sensors_are_judged(self):
+        subprocess.run([kilvo, "simulate", "room", "--out", self.path("walks", "room"), "--duration", "12", "--quiet"], check=True)
+        # The LiDAR turned by 20 degrees.
+        wrong = "lidar.T_imu_lidar.R=[0.9396926208, 0, 0.3420201433, 0, 1, 0, -0.3420201433, 0, 0.9396926208]"
+        self.run_it("--out", self.path("out"), "--only", "accuracy", "--set", wrong, self.path("walks"))
+        text = self.read("out", "results.md")
+        self.assertIn("room, ended as failed by kilvo but judged here all the same: KILV: the robot's description is wrong: the LiDAR", text)
+        self.assertRegex(text, r"\| room \| [\d.]+( x)? \| [\d.]+( x)? \| [\d.]+( x)? \| [\d.]+( x)? \| [\d.]+ \|")
+
+    def test_lengths_that_contradict_each_other_are_refused(self):
+        told = self.run_it("--out", self.path("out"), "--full", "--duration", "5", code=2)
+        self.assertIn("--full", told)
 
     def test_a_recording_that_fails_is_named(self):
         told = self.run_it("--out", self.path("out"), "--walks", "moon", "--only", "accuracy", code=1)
