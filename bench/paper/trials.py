@@ -3,6 +3,7 @@ import bisect
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -343,11 +344,20 @@ class Trials:
         return out
 
 
-def legs_alone(kilvo: str, walk: str, seed: int, level: int, seconds: float, folder: str, settings: list[str]) -> dict | None:
+def cut_to(kilvo: str, walk: str, most: float | None, folder: str) -> list[str]:
+    """As words for kilvo simulate, whose --duration would let a walk that is over stand on."""
+    if most is None:
+        return []
+    # Without images and scans a matter of a second.
+    with tempfile.TemporaryDirectory(dir=folder) as made:
+        said = output_of([kilvo, "simulate", walk, "--out", os.path.join(made, "walk"), "--sensors", "imu"])
+    return ["--duration", f"{most:g}"] if float(re.search(r": ([0-9.]+) s of '", said).group(1)) > most else []
+
+
+def legs_alone(kilvo: str, walk: str, seed: int, level: int, length: list[str], folder: str, settings: list[str]) -> dict | None:
     """Drift of legs and IMU alone on a walk that is made for it, of a robot as it is described (level 0) or one that is kept well (1)."""
     made = os.path.join(folder, f"legs_{walk}_{seed}_{level}")
-    output_of([kilvo, "simulate", walk, "--out", made, "--seed", str(seed), "--rough", str(level), "--duration", f"{seconds:g}", "--sensors", "legs,imu",
-               "--quiet"])
+    output_of([kilvo, "simulate", walk, "--out", made, "--seed", str(seed), "--rough", str(level), *length, "--sensors", "legs,imu", "--quiet"])
     recording = {"bag": os.path.join(made, "recording.bag"), "truth": os.path.join(made, "gt.tum"), "config": os.path.join(made, "config.yaml")}
     try:
         return Trials(kilvo, recording, os.path.join(made, "runs"), settings, None).run("KI").drift()
