@@ -1,29 +1,28 @@
-# kilvo_module(NAME [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
+# kilvo_module(NAME [UNIT files] [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
 #
 # One folder is one module is one CMake target, `kilvo_NAME` (alias `kilvo::NAME`): every *.cpp is compiled,
 # every *_test.cpp beside it goes into one test program `kilvo_NAME_test`. Every *.hpp compiles alone (scripts/check_headers).
 # What a module may include is listed in modules.txt and checked by scripts/check_modules.
 
 add_library(kilvo_flags INTERFACE)
-target_compile_options(kilvo_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -fno-math-errno -fno-trapping-math
-                                             $<$<BOOL:${KILVO_WARNINGS_AS_ERRORS}>:-Werror>)
+# In a unit of several files a local may have the name of a helper in the file before.
+target_compile_options(kilvo_flags INTERFACE -Wall -Wextra -Wconversion $<$<NOT:$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wshadow> -fno-math-errno
+                                             -fno-trapping-math $<$<BOOL:${KILVO_WARNINGS_AS_ERRORS}>:-Werror>)
 # g++ 12 warns at -O3 of what cannot be in the standard library's own inlined code, most of all behind precompiled headers, where it no longer knows
 # them as the system's: reported, but no reason to stop.
 target_compile_options(kilvo_flags INTERFACE
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${KILVO_WARNINGS_AS_ERRORS}>>:-Wno-error=array-bounds;-Wno-error=stringop-overflow;-Wno-error=stringop-overread;-Wno-error=maybe-uninitialized;-Wno-error=restrict>)
 
-# kilvo_wide(FILE...): the functions marked KILVO_WIDE in these sources are compiled twice, for any x86-64 and for AVX2; which one runs is
-# decided when the program starts. Both give the same bits, since products and sums are not fused. Sanitizers do not stand the choice.
+# Functions marked KILVO_WIDE are compiled twice, for any x86-64 and for AVX2; which one runs is decided when the program starts. Both give
+# the same bits, since products and sums are not fused. Sanitizers do not stand the choice.
 set(KILVO_WIDE "")
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT CMAKE_CXX_FLAGS MATCHES "sanitize")
   set(KILVO_WIDE "__attribute__((target_clones(\"avx2\",\"default\")))")
 endif()
-function(kilvo_wide)
-  set_source_files_properties(${ARGN} PROPERTIES COMPILE_DEFINITIONS "KILVO_WIDE=${KILVO_WIDE}")
-endfunction()
+target_compile_definitions(kilvo_flags INTERFACE "KILVO_WIDE=${KILVO_WIDE}")
 
 function(kilvo_module name)
-  cmake_parse_arguments(MODULE "" "" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
+  cmake_parse_arguments(MODULE "" "UNIT" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   file(GLOB tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp)
   file(GLOB fuzzers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_fuzz.cpp)
@@ -40,6 +39,7 @@ function(kilvo_module name)
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:kilvo_flags> ${MODULE_PRIVATE})
     kilvo_precompile(${target})
+    kilvo_unity(${target} ${MODULE_UNIT})
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)

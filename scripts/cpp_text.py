@@ -1,5 +1,6 @@
 """Reads C++ source well enough for the checks of this folder: no comments or strings in the way, and which brace opens what."""
 import hashlib
+import json
 import os
 import re
 from typing import Iterator, NamedTuple
@@ -45,9 +46,20 @@ def fingerprint(root: str, path: str, others: list[str], command: str) -> str:
     return digest.hexdigest()
 
 
-def without_precompiled(command: str) -> str:
-    """A compile command that reads its headers from source."""
-    return re.sub(r" -Winvalid-pch| -include \S*cmake_pch\.hxx", "", command)
+def compile_commands(build: str) -> list[dict[str, str]]:
+    """compile_commands.json as if each source were compiled alone, with its headers read from source: no units, nothing precompiled."""
+    with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as file:
+        entries = json.load(file)
+    alone = []
+    for entry in entries:
+        command = re.sub(r" -Winvalid-pch| -include \S*cmake_pch\.hxx", "", entry["command"])
+        sources = [entry["file"]]
+        if re.search(r"/Unity/unity_\d+_cxx\.cxx$", entry["file"]):
+            with open(entry["file"], encoding="utf-8") as file:
+                sources = re.findall(r'^#include "(.+)"$', file.read(), flags=re.M)
+        for source in sources:
+            alone.append({**entry, "file": source, "command": command.replace(f"-c {entry['file']}", f"-c {source}")})
+    return alone
 
 
 _LEXEME = re.compile(

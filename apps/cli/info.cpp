@@ -25,15 +25,15 @@ struct InfoOptions {
   std::vector<std::filesystem::path> paths() const { return {inputs.begin(), inputs.end()}; }
 };
 
-std::string names_of(const std::vector<Sensor>& sensors) {
+std::string listed(const std::vector<Sensor>& sensors) {
   std::string names;
   for (const Sensor sensor : sensors) names += (names.empty() ? "" : ", ") + std::string(name_of(sensor));
   return names;
 }
 
 std::string use_of(const lab::TopicDescription& topic) {
-  if (!topic.used_for.empty()) return names_of(topic.used_for);
-  return topic.fits.empty() ? "-" : fmt::format("- (could be {})", names_of(topic.fits));
+  if (!topic.used_for.empty()) return listed(topic.used_for);
+  return topic.fits.empty() ? "-" : fmt::format("- (could be {})", listed(topic.fits));
 }
 
 void print_topics(const lab::RecordingDescription& about) {

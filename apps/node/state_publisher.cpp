@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "kilvo/math/decompositions.hpp"
+
 namespace kilvo::node {
 namespace {
 

@@ -1,6 +1,6 @@
 #include "kilvo/estimator/degradation.hpp"
 
-#include <Eigen/Eigenvalues>
+#include "kilvo/math/decompositions.hpp"
 
 namespace kilvo {
 namespace {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kilvo/math/decompositions.hpp"
+
 namespace kilvo {
 namespace {
 

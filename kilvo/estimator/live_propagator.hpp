@@ -3,8 +3,6 @@
 // the same History and LegPipeline. docs/decisions/2026-11-21-the-fast-thread-runs-ahead.md says why.
 #pragma once
 
-#include <optional>
-
 #include "kilvo/estimator/history.hpp"
 #include "kilvo/estimator/imu_watch.hpp"
 #include "kilvo/estimator/output.hpp"

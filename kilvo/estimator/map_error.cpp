@@ -1,11 +1,11 @@
 #include "kilvo/estimator/map_error.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "kilvo/filter/pose_error.hpp"
+#include "kilvo/math/decompositions.hpp"
 
 namespace kilvo {
 namespace {
@@ -28,7 +28,7 @@ PoseCovariance inverse_of_known(const PoseCovariance& A) {
   const double rotation = std::sqrt(3.0 / A.topLeftCorner<3, 3>().trace()), position = std::sqrt(3.0 / A.bottomRightCorner<3, 3>().trace());
   Eigen::Matrix<double, 6, 1> scale;
   scale << rotation, rotation, rotation, position, position, position;
-  const Eigen::SelfAdjointEigenSolver<PoseCovariance> eig(scale.asDiagonal() * A * scale.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<PoseCovariance> eig(PoseCovariance(scale.asDiagonal() * A * scale.asDiagonal()));
   constexpr double known = 1e-6;
   const Eigen::Matrix<double, 6, 1> inverse = eig.eigenvalues().unaryExpr([](double l) { return l > known ? 1.0 / l : 0.0; });
   return scale.asDiagonal() * eig.eigenvectors() * inverse.asDiagonal() * eig.eigenvectors().transpose() * scale.asDiagonal();

@@ -8,7 +8,7 @@ namespace {
 
 // However large a correction is, it moves the pose no faster, m/s, rad/s; and however long nothing came, one output takes in no more than
 // so many seconds of it.
-constexpr double most_moved = 1, most_turned = 1, longest = 0.2;
+constexpr double most_moved = 1, most_turned = 1, most_time = 0.2;
 
 Eigen::Vector3d at_most(const Eigen::Vector3d& v, double length) {
   const double n = v.norm();
@@ -27,7 +27,7 @@ SE3 SmoothOdometry::add(const Output& output) {
     pose_.p += 0.5 * dt * (v_ + x.v);
     pose_.R = pose_.R * SO3::Exp(0.5 * dt * (omega_ + output.omega));
     const double share = -std::expm1(-dt / time_);
-    const double taken = std::min(dt, longest);
+    const double taken = std::min(dt, most_time);
     pose_.p += at_most(share * (x.p - pose_.p), taken * most_moved);
     pose_.R = pose_.R * SO3::Exp(at_most(share * (pose_.R.inverse() * x.R).Log(), taken * most_turned));
   }

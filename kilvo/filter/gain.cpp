@@ -1,8 +1,6 @@
 #include "kilvo/filter/gain.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <cstring>
 
 namespace kilvo {
 namespace {

@@ -1,7 +1,6 @@
 #include "kilvo/filter/innovation.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 
 namespace kilvo {
 

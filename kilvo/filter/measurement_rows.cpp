@@ -1,8 +1,9 @@
 #include "kilvo/filter/measurement_rows.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
+
+#include "kilvo/math/decompositions.hpp"
 
 namespace kilvo {
 

@@ -1,7 +1,6 @@
 #include "kilvo/filter/stationarity.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace kilvo {
 namespace {

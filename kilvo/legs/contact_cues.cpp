@@ -7,7 +7,6 @@ namespace kilvo {
 namespace {
 
 constexpr double smooth_force = 0.03, smooth_load = 0.02;  // s
-constexpr double longest_step = 0.05;                      // s, between samples
 constexpr double shortest_leg = 0.1;                       // m
 
 Eigen::Vector3d centre_of(const FootPose& foot) {

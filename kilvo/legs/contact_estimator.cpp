@@ -11,7 +11,7 @@ constexpr double stands = 0.5;
 constexpr double detection_threshold = 10;  // theta_d
 constexpr double statistics_time = 2.0;     // s, of the acceleration
 constexpr double normal_time = 0.5;         // s, of the ground's normal
-constexpr double sure = 0.8;                // of the foot that shows it
+constexpr double sure_of_foot = 0.8;        // of the foot that shows it
 
 }  // namespace
 
@@ -30,7 +30,7 @@ void ContactEstimator::start(const Feet& feet, const State& x) {
 void ContactEstimator::follow_ground(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion, double dt) {
   for (std::size_t side = 0; side < 2; ++side) {
     const double alone = filter_.probabilities()[side == 0 ? ContactFilter::left : ContactFilter::right];
-    if (alone < sure || motion[side].speed > contacts_.fast_sole || motion[side].rolling > contacts_.fast_sole) continue;
+    if (alone < sure_of_foot || motion[side].speed > contacts_.fast_sole || motion[side].rolling > contacts_.fast_sole) continue;
     if (const auto normal = sole_normal(feet.foot[side], x, -x.g.normalized()))
       contacts_.normal = (contacts_.normal + std::min(1.0, dt / normal_time) * (*normal - contacts_.normal)).normalized();
   }

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <optional>
 
 #include "kilvo/filter/state.hpp"
 #include "kilvo/legs/contact_cues.hpp"

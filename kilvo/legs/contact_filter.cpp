@@ -9,7 +9,7 @@ constexpr double prior_time = 1.0, memory = 3.0;  // s of support, of learning
 // Samples closer together than this say one thing together, s.
 constexpr double correlation = 0.005;
 // So sure of a state, its cues are learnt from.
-constexpr double sure = 0.8;
+constexpr double sure_of_state = 0.8;
 // Both feet belong to a walk for so long after one of them carried alone, s.
 constexpr double within_walk = 0.5;
 // What one cue may say at the most: it may be wrong in a way that nobody has thought of.
@@ -158,7 +158,7 @@ void ContactFilter::learn(const ContactCues& cues) {
   since_support_ += cues.dt;
   for (std::size_t side = 0; side < 2; ++side) {
     const double p = pi_[side == 0 ? left : right];
-    if (p <= sure) continue;
+    if (p <= sure_of_state) continue;
     since_support_ = 0;
     const double weight = p * cues.dt;
     (side == 0 ? on_left_ : on_right_).add(cues.force_side, weight);
@@ -167,7 +167,7 @@ void ContactFilter::learn(const ContactCues& cues) {
     stance_.add(std::log(cues.speed[side] + slowest), weight);
     swing_.add(std::log(cues.speed[1 - side] + slowest), weight);
   }
-  if (pi_[both] > sure && since_support_ < within_walk) {
+  if (pi_[both] > sure_of_state && since_support_ < within_walk) {
     level_.add(cues.height, pi_[both] * cues.dt);
     on_both_.add(cues.force_side, pi_[both] * cues.dt);
   }

@@ -1,7 +1,6 @@
 // What a sole does in the world, seen with a state.
 #pragma once
 
-#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <optional>
 
@@ -9,6 +8,8 @@
 #include "kilvo/legs/leg_kinematics.hpp"
 
 namespace kilvo {
+
+inline constexpr double longest_step = 0.05;  // s between samples of the legs; what takes longer counts as that
 
 /// Velocity in the world of a point that is at p_I and moves by v_I relative to the IMU, m/s. `omega`: bias-free rate, rad/s.
 inline Eigen::Vector3d velocity_W(const State& x, const Eigen::Vector3d& p_I, const Eigen::Vector3d& v_I, const Eigen::Vector3d& omega) {

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstdint>
 #include <optional>
 
 #include "kilvo/filter/measurement_rows.hpp"

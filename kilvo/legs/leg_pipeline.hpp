@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 
 #include "kilvo/filter/state.hpp"
 #include "kilvo/legs/contact_detector.hpp"

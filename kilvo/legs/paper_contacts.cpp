@@ -1,7 +1,5 @@
 #include "kilvo/legs/paper_contacts.hpp"
 
-#include <algorithm>
-
 namespace kilvo {
 namespace {
 

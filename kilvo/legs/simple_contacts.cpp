@@ -1,7 +1,6 @@
 #include "kilvo/legs/simple_contacts.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace kilvo {
 namespace {

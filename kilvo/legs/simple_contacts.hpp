@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 
 #include "kilvo/legs/contact_estimator.hpp"
 

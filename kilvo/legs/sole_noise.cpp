@@ -6,18 +6,18 @@
 namespace kilvo {
 namespace {
 
-constexpr double prior = 3, memory = 15;  // averages
+constexpr double prior_averages = 3, memory_averages = 15;
 // Before anything is known of the soles, m/s.
 constexpr double first_guess = 0.1;
 // The state follows the sole in part, so that less is seen than there is; and what is alike at all steps does not average out.
 constexpr double common = 2;
 
-double square(double x) { return x * x; }
-
 }  // namespace
 
 SoleNoise::SoleNoise(const LegConfig& config)
-    : config_(config), across_(square(first_guess), 0, prior, memory), upwards_(square(config.vertical_velocity_sigma), 0, prior, memory) {}
+    : config_(config),
+      across_(first_guess * first_guess, 0, prior_averages, memory_averages),
+      upwards_(config.vertical_velocity_sigma * config.vertical_velocity_sigma, 0, prior_averages, memory_averages) {}
 
 void SoleNoise::add(std::size_t side, const Eigen::Vector3d& velocity_W, const Eigen::Vector3d& up_W, double dt) {
   Sum& sum = sum_[side];

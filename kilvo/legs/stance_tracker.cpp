@@ -25,7 +25,7 @@ constexpr double sink_share = 0.15;
 constexpr double entry_time = 0.02;
 // Of two feet that stand, the lighter one counts less: a sole that carries little slides and rolls. So much is left to it at least.
 constexpr double least_load = 0.01;
-constexpr double shortest_step = 1e-4, longest_step = 0.05;  // s
+constexpr double shortest_step = 1e-4;  // s
 
 // How much each corner of a sole carries, which adds up to one.
 std::array<double, max_corners> share_of_corners(const FootPose& pose, const State& x, const Eigen::Vector3d& omega, double rolling) {

@@ -1,9 +1,10 @@
 #include "kilvo/lidar/degeneracy.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "kilvo/math/decompositions.hpp"
 
 namespace kilvo {
 namespace {

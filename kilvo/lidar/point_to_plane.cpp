@@ -1,6 +1,5 @@
 #include "kilvo/lidar/point_to_plane.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -24,7 +23,7 @@ constexpr double robust_cost = 1.014;
 constexpr float thickness_min_count = 4;
 
 // Points looked up at once.
-constexpr std::size_t block = 256;
+constexpr std::size_t at_once = 256;
 
 // The row of a plane through q_W with the normal n_W = R n_I under the point p_I, which is x_W in the world.
 inline PointToPlaneRow row_of(const Eigen::Vector3d& p_I, const Eigen::Vector3d& x_W, const Eigen::Vector3d& n_I,
@@ -78,9 +77,9 @@ bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluste
 
 // A cluster that is still in the leaf where the last iterate put it finds the same there.
 void LidarModel::look_up_planes(std::size_t first, std::size_t last, const SE3& T_WI) {
-  std::array<Eigen::Vector3d, block> points;
-  std::array<std::size_t, block> wanted;
-  std::array<VoxelMap::Match, block> found;
+  std::array<Eigen::Vector3d, at_once> points;
+  std::array<std::size_t, at_once> wanted;
+  std::array<VoxelMap::Match, at_once> found;
   std::size_t count = 0;
   for (std::size_t i = first; i < last; ++i) {
     const Eigen::Vector3d x = T_WI * clusters_[i].mean.cast<double>();
@@ -127,8 +126,8 @@ LidarModel::Association LidarModel::associate(std::size_t i, const Iterate& at, 
 
 // Rows of a block on their way into the sums.
 struct Waiting {
-  std::array<OuterRow, block> rows;
-  std::array<OuterRow, 2 * block> fake;
+  std::array<OuterRow, at_once> rows;
+  std::array<OuterRow, 2 * at_once> fake;
   std::size_t row_count = 0, fake_count = 0;
 };
 
@@ -189,7 +188,7 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   const SE3 T_WI = x.pose();
   const Iterate at{T_WI, prior.topLeftCorner<6, 6>() + map_error_};
   report_.clusters = static_cast<int>(clusters_.size());
-  report_.rejected = workers_.sum(clusters_.size(), block, 0, [&](std::size_t first, std::size_t last) {
+  report_.rejected = workers_.sum(clusters_.size(), at_once, 0, [&](std::size_t first, std::size_t last) {
     int rejected = 0;
     look_up_planes(first, last, T_WI);
     for (std::size_t i = first; i < last; ++i) associations_[i] = associate(i, at, rejected);
@@ -198,7 +197,7 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   for (const Association& a : associations_) {
     if (a.plane != nullptr) ++rows_of_node_[a.node];
   }
-  Sums sums = workers_.sum(associations_.size(), block, Sums{}, [&](std::size_t first, std::size_t last) {
+  Sums sums = workers_.sum(associations_.size(), at_once, Sums{}, [&](std::size_t first, std::size_t last) {
     Waiting waiting;
     Sums part;
     part.waiting = &waiting;

@@ -1,7 +1,6 @@
 #include "kilvo/lidar/relocate.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
@@ -20,7 +19,7 @@ constexpr std::size_t finalists = 12;
 constexpr double near_surface = 0.08, per_metre = 0.02;  // m
 // So much of what meets a surface lies on it when the pose is right; a second pose must be worse by a tenth.
 constexpr double least_share = 0.75, clearly = 0.1;
-constexpr int fewest_rows = 60;
+constexpr int fewest_rows_found = 60;
 constexpr double same_place = 0.15, same_heading = 0.05;
 
 struct Candidate {
@@ -94,7 +93,7 @@ std::vector<Candidate> best_of(std::vector<Candidate> all) {
 }
 
 // The registration from a pose of the grid: first with wide gates, then with narrow ones, which judge it.
-struct Registration {
+struct GridRegistration {
   const VoxelMap& map;
   std::span<const PointCluster> clusters;
   const Eigen::Vector3d& p_IL;
@@ -118,7 +117,7 @@ struct Registration {
       LidarModel judge(map, clusters, p_IL, PoseCovariance::Zero(), config, workers);
       out.info = judge(e.x, 0.25 * gate);
       const RegistrationReport& report = judge.report();
-      out.share = report.matched < fewest_rows ? 0 : static_cast<double>(report.matched) / (report.matched + report.rejected);
+      out.share = report.matched < fewest_rows_found ? 0 : static_cast<double>(report.matched) / (report.matched + report.rejected);
     }
     out.x = e.x;
     return out;
@@ -138,7 +137,7 @@ std::optional<FoundPose> find_pose(const VoxelMap& map, std::span<const PointClu
   const std::vector<Probe> looked_up = probes_of(clusters);
   std::vector<Candidate> grid = grid_around(expected);
   for (Candidate& c : grid) c.score = score_of(map, looked_up, c.T_WI);
-  const Registration registration{map, clusters, p_IL, config, workers};
+  const GridRegistration registration{map, clusters, p_IL, config, workers};
   std::vector<FoundPose> found;
   for (const Candidate& c : best_of(std::move(grid))) found.push_back(registration.from(expected, c.T_WI));
   // Nearly every point of a sweep that is in its place meets a surface: what met none counts against a pose as well.

@@ -1,10 +1,9 @@
 #include "kilvo/math/so3.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
-#include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "kilvo/math/decompositions.hpp"
 
 namespace kilvo {
 namespace {

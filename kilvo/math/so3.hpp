@@ -2,7 +2,6 @@
 // Source: Sola, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics", Eqs. 132-144.
 #pragma once
 
-#include <Eigen/Core>
 #include <Eigen/Geometry>
 
 namespace kilvo {

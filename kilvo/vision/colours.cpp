@@ -1,7 +1,6 @@
 #include "kilvo/vision/colours.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace kilvo {
 namespace {

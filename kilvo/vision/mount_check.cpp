@@ -1,9 +1,10 @@
 #include "kilvo/vision/mount_check.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
+
+#include "kilvo/math/decompositions.hpp"
 
 namespace kilvo {
 namespace {

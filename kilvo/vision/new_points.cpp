@@ -10,9 +10,9 @@ namespace kilvo {
 namespace {
 
 // Pixels around a new point that its coarser patches need.
-constexpr double border = 20;
+constexpr double new_point_border = 20;
 // Surfaces seen at a flatter angle than this (its sine) are no use.
-constexpr double grazing = 0.2;
+constexpr double grazing_new = 0.2;
 
 }  // namespace
 
@@ -22,7 +22,7 @@ bool project_to_plane(const VoxelMap& map, const Eigen::Vector3d& eye_W, VisualP
   return map.visit_planes(point.p_W, [&](const VoxelMap::Match& match) {
     const Eigen::Vector3d n = match.plane->normal.cast<double>();
     const double slope = n.dot(ray);
-    if (std::abs(slope) < grazing * ray.norm()) return false;
+    if (std::abs(slope) < grazing_new * ray.norm()) return false;
     const Eigen::Vector3d on_plane = eye_W + ray * (n.dot(match.plane->centre - eye_W) / slope);
     if ((on_plane - point.p_W).norm() > near) return false;
     point.p_W = on_plane;
@@ -92,7 +92,7 @@ void add_plain(const Search& search, int block, std::span<const PatchCandidate> 
   for (const NewPoint& p : out) taken[blocks.of(p.pixel)] = true;
   for (const DepthView::Seen& s : search.depth.seen()) {
     const Eigen::Vector2d pixel = pixel_of(s);
-    if (!search.camera.sees(pixel, border) || taken[blocks.of(pixel)] || !search.is_even(pixel)) continue;
+    if (!search.camera.sees(pixel, new_point_border) || taken[blocks.of(pixel)] || !search.is_even(pixel)) continue;
     const auto found = search.at(pixel, s, some);
     if (!found) continue;
     taken[blocks.of(pixel)] = true;
@@ -111,7 +111,7 @@ std::vector<NewPoint> new_points(const VoxelMap& map, const Camera& camera, cons
   std::vector<NewPoint> best(grid.size());
   for (const DepthView::Seen& s : depth.seen()) {
     const Eigen::Vector2d pixel = pixel_of(s);
-    if (!camera.sees(pixel, border)) continue;
+    if (!camera.sees(pixel, new_point_border)) continue;
     const std::size_t cell = grid.of(pixel);
     if (taken[cell]) continue;
     const float corner = corner_of(image, static_cast<int>(pixel.x()), static_cast<int>(pixel.y()));

@@ -5,7 +5,6 @@
 #include <array>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "kilvo/map/visual_map.hpp"
 #include "kilvo/vision/pyramid.hpp"

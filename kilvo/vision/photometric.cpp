@@ -14,7 +14,7 @@ namespace {
 // Beyond this many standard deviations the pull of a patch stays the same (Huber).
 constexpr double robust_sigmas = 1.5;
 // Pixels a patch needs around it at its level.
-constexpr double border = 5;
+constexpr double patch_border = 5;
 // An expected error of so many pixels is within reach of the finest level; twice that of the next.
 constexpr double reach = 0.7;
 
@@ -100,7 +100,8 @@ PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x)
   if (!view) return out;
   const GreyImage& image = pyramid_[static_cast<std::size_t>(level_)];
   const Eigen::Vector2d at = at_level(view->pixel, level_);
-  if (at.x() < border || at.y() < border || at.x() > image.width - 1 - border || at.y() > image.height - 1 - border) return out;
+  if (at.x() < patch_border || at.y() < patch_border || at.x() > image.width - 1 - patch_border || at.y() > image.height - 1 - patch_border)
+    return out;
   Values seen;
   sample_patch(image, at.cast<float>(), seen);
   verdict.correlation = correlation(seen, p.patch->value);

@@ -10,7 +10,7 @@ namespace kilvo {
 namespace {
 
 // Pixels that a patch needs around it, at level 0.
-constexpr double border = 10;
+constexpr double selected_border = 10;
 // Surfaces seen at a flatter angle than this (its sine) are no use.
 constexpr double grazing = 0.12;
 // Views that differ by more show another picture, rad.
@@ -108,7 +108,7 @@ std::vector<PatchCandidate> select_patches(const VisualMap& map, const Camera& c
     map.visit(key, [&](std::uint32_t id, const VisualPoint& p) {
       const Eigen::Vector3d p_C = T_CW * p.p_W;
       const auto pixel = camera.project(p_C);
-      if (!pixel || !camera.sees(*pixel, border)) return;
+      if (!pixel || !camera.sees(*pixel, selected_border)) return;
       Best& best = cells[grid.of(*pixel)];
       // Those that have proven themselves first.
       const double worth = static_cast<double>(p.corner) * (1.0 + std::min<int>(p.seen, 10)) / (1.0 + p.failed);

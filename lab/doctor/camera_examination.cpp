@@ -8,11 +8,10 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double rotation_tolerance = 2;    // degrees
-constexpr double focal_tolerance = 0.06;    // of the focal length
-constexpr double clock_tolerance = 0.0045;  // s
-constexpr double sure = 4;                  // standard deviations
-constexpr double much_better = 0.7;         // of the error that a hypothesis may leave
+constexpr double camera_rotation_tolerance = 2;    // degrees
+constexpr double focal_tolerance = 0.06;           // of the focal length
+constexpr double camera_clock_tolerance = 0.0045;  // s
+constexpr double much_better_images = 0.7;         // of the error that a hypothesis may leave
 
 struct CameraHypothesis {
   std::string cause, text, key;
@@ -133,7 +132,7 @@ bool Examination::try_camera_hypotheses(const CameraTracks& tracks) {
   // How well it can be: small turns, focal length and clock are for the fit.
   std::vector<double> offsets = tracks.likely_offsets(1.3);
   offsets.insert(offsets.begin(), 0);
-  double best = much_better * described;
+  double best = much_better_images * described;
   const CameraHypothesis* which = nullptr;
   const CameraFit refined = tracks.fit({robot_.camera, 0}, true, true);
   // What a small correction of the description achieves, a hypothesis must surpass.
@@ -232,8 +231,8 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
                {"camera.fy", fmt::format("{:.3f}", fit.focal * robot_.camera.fy)}};
   refinements_.push_back(std::move(r));
   refine_offset(Sensor::camera, fit.offset, fit.fit.sigma(4), clock_method);
-  if (angle > std::max(rotation_tolerance, sure * uncertain) && angle < 15 && accuse_principal_point(tracks, fit)) return;
-  if (angle > std::max(rotation_tolerance, sure * uncertain)) {
+  if (angle > std::max(camera_rotation_tolerance, sure * uncertain) && angle < 15 && accuse_principal_point(tracks, fit)) return;
+  if (angle > std::max(camera_rotation_tolerance, sure * uncertain)) {
     Finding f;
     f.sensor = Sensor::camera;
     f.cause = "camera_rotation";
@@ -264,7 +263,7 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
     check(Sensor::camera, "focal length", focal_sigma > 0.05 ? Check::Verdict::unknown : Check::Verdict::good, focal);
   }
   const double offset_sigma = fit.fit.sigma(4);
-  if (std::abs(fit.offset) > std::max(clock_tolerance, sure * offset_sigma)) {
+  if (std::abs(fit.offset) > std::max(camera_clock_tolerance, sure * offset_sigma)) {
     find_offset(Sensor::camera, fit.offset, offset_sigma, evidence);
   } else {
     check(Sensor::camera, "clock", Check::Verdict::good,

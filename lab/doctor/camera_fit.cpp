@@ -1,10 +1,10 @@
 #include "lab/doctor/camera_fit.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "kilvo/math/decompositions.hpp"
 #include "kilvo/vision/camera.hpp"
 #include "lab/doctor/turns.hpp"
 
@@ -13,9 +13,9 @@ namespace {
 
 constexpr std::size_t fewest_tracks = 10;  // of a pair
 constexpr std::size_t most_pairs = 160;
-constexpr double slack = 0.06;         // s, at both ends of the gyro's path
-constexpr double least_way = 0.012;    // m between images, below which the direction is not known
-constexpr double near_epipole = 0.08;  // sine
+constexpr double camera_slack = 0.06;      // s, at both ends of the gyro's path
+constexpr double least_image_way = 0.012;  // m between images, below which the direction is not known
+constexpr double near_epipole = 0.08;      // sine
 
 double clamp_px(double e) { return std::clamp(e, -200.0, 200.0); }
 
@@ -40,7 +40,7 @@ Eigen::Vector3d direction_of(const std::vector<Eigen::Vector3d>& normals) {
 CameraTracks::CameraTracks(const std::vector<TrackedPair>& tracks, const GyroPath& gyro, const LidarWay* way) : gyro_(gyro), way_(way) {
   std::vector<const TrackedPair*> all;
   for (const TrackedPair& pair : tracks) {
-    if (pair.tracks.size() >= fewest_tracks && pair.to - pair.from < 0.4 && gyro.covers(pair.from - slack, pair.to + slack))
+    if (pair.tracks.size() >= fewest_tracks && pair.to - pair.from < 0.4 && gyro.covers(pair.from - camera_slack, pair.to + camera_slack))
       all.push_back(&pair);
   }
   // The pairs that turned most say most; of those an even choice in time.
@@ -96,7 +96,7 @@ void CameraTracks::residuals(const CameraGuess& guess, const std::vector<std::ve
         t = ((*A * T_IC).inverse() * (*B * T_IC)).p;
       }
     }
-    const bool known = t.norm() > least_way;
+    const bool known = t.norm() > least_image_way;
     t = known ? Eigen::Vector3d(t.normalized()) : direction_of(normals);
     for (std::size_t k = 0; k < normals.size(); ++k) {
       const double sine = std::max(t.cross(first[k]).norm(), near_epipole);
@@ -132,7 +132,7 @@ CameraFit CameraTracks::fit(const CameraGuess& guess, bool with_focal, bool with
   }
   const auto rows = [&](const Eigen::VectorXd& x, Residuals& r) {
     residuals(guess, rays, guess.mount.T_imu_camera.R * SO3::Exp(x.head<3>()), std::exp(std::clamp(x[3], -2.0, 2.0)),
-              guess.offset + std::clamp(x[4], -slack, slack), 1, r);
+              guess.offset + std::clamp(x[4], -camera_slack, camera_slack), 1, r);
   };
   Eigen::VectorXd start = Eigen::VectorXd::Zero(5), prior(5), step(5);
   prior << INFINITY, INFINITY, INFINITY, with_focal ? 1.0 : 1e-6, with_offset ? 1.0 : 1e-7;

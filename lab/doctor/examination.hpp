@@ -17,6 +17,10 @@
 
 namespace kilvo::lab {
 
+inline constexpr double sure = 4;              // standard deviations
+inline constexpr double gravity = 9.80665;     // m/s^2
+inline constexpr double turn_interval = 0.04;  // s, of a turn of the legs
+
 /// How one sense's turning agrees with the gyro's.
 struct SenseAgreement {
   bool present = false;

@@ -8,7 +8,6 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double gravity = 9.80665;  // m/s^2
 constexpr double per_degree = 57.29577951308232;
 constexpr double rate_tolerance = 0.2;  // of the nominal rate
 

@@ -9,8 +9,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double interval = 0.04;           // s, of a turn
-constexpr double height_tolerance = 0.014;  // m
+constexpr double link_height_tolerance = 0.014;  // m
 
 }  // namespace
 
@@ -37,7 +36,7 @@ void Examination::settle_imu_link(const SO3& measured) {
     LegHypothesis h;
     h.robot = [&name](Robot& r) { r.imu.link = name; };
     if (turns_with_link(h)) continue;
-    const std::vector<Turn> turns = leg_turns(legs_under(&h), interval);
+    const std::vector<Turn> turns = leg_turns(legs_under(&h), turn_interval);
     if (turns.size() < 30) continue;
     const double explained = explained_by(turns, path, leg_offset_, described.inverse().matrix());
     const MountFit fit = fit_mount(turns, path, described.inverse(), leg_offset_);
@@ -81,7 +80,7 @@ std::string Examination::link_at_height(double height) const {
       const FootPose &a = here[i].foot[0], &b = there[i].foot[0];
       const double moved = up.dot(b.p[0] - a.p[0]);
       // Feet that lie higher in the link's frame let the LiDAR stand lower.
-      return (b.R_IF.inverse() * a.R_IF).Log().norm() < 0.02 && std::abs(height - moved) < height_tolerance;
+      return (b.R_IF.inverse() * a.R_IF).Log().norm() < 0.02 && std::abs(height - moved) < link_height_tolerance;
     };
     if (same(0) && same(here.size() / 2) && same(here.size() - 1)) return name;
   }

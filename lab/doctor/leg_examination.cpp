@@ -1,21 +1,20 @@
 // The legs: units and names of their joints, the URDF, and the IMU's mount on the link that they carry.
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <fmt/core.h>
 #include <set>
 
+#include "kilvo/math/decompositions.hpp"
 #include "lab/doctor/examination.hpp"
 #include "lab/doctor/leg_hypotheses.hpp"
 
 namespace kilvo::lab {
 namespace {
 
-constexpr double interval = 0.04;  // s, of a turn
-constexpr double period = 0.009;   // s between poses
+constexpr double pose_period = 0.009;  // s between poses
 constexpr double least_explained = 0.5;
-constexpr double much_better = 0.6;  // of the cost that a hypothesis may leave
+constexpr double much_better_legs = 0.6;  // of the cost that a hypothesis may leave
 
 // Normal of a sole, towards the link that stands on it.
 Eigen::Vector3d normal_of(const FootPose& foot) {
@@ -49,14 +48,14 @@ std::vector<LegPose> Examination::legs_under(const LegHypothesis* hypothesis) co
   LegHypothesis both;
   if (hypothesis != nullptr) both = *hypothesis;
   if (leg_mend_ && hypothesis != &*leg_mend_) both = joined(*leg_mend_, both);
-  return leg_path(recorded_, robot_, &both, period, nullptr);
+  return leg_path(recorded_, robot_, &both, pose_period, nullptr);
 }
 
 // How far the soles are from flat on the ground while the robot stands still.
 Examination::LegScore Examination::score_legs(const LegHypothesis* hypothesis, double offset, bool any_mount) const {
   LegScore out;
   const std::vector<LegPose> path = legs_under(hypothesis);
-  const std::vector<Turn> turns = leg_turns(path, interval);
+  const std::vector<Turn> turns = leg_turns(path, turn_interval);
   const GyroPath gyro_path = gyro();
   const SO3 described = robot_.imu.T_link_imu.R.inverse();
   out.axes = described.matrix();
@@ -174,12 +173,12 @@ void Examination::examine_legs() {
     return;
   }
   if (!examine_leg_names()) return;
-  leg_turns_ = leg_turns(legs_under(nullptr), interval);
+  leg_turns_ = leg_turns(legs_under(nullptr), turn_interval);
   legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
   // A clock that is off first: any joint looks wrong at another time.
   leg_offset_ = legs_.known ? legs_.offset : 0;
   if (find_leg_start() || try_leg_hypotheses() || try_standing_hypotheses()) {
-    leg_turns_ = leg_turns(legs_under(nullptr), interval);
+    leg_turns_ = leg_turns(legs_under(nullptr), turn_interval);
     legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
   }
   if (!legs_.known && !feet_stand()) {
@@ -218,7 +217,7 @@ bool Examination::try_leg_hypotheses() {
   constexpr double well = 0.008;  // of a description that needs no other
   if (cost < well) return false;
   const LegHypothesis* best = nullptr;
-  double least = std::min(much_better * cost, cost - well);
+  double least = std::min(much_better_legs * cost, cost - well);
   LegScore score;
   std::vector<LegHypothesis> all = leg_hypotheses(recorded_, robot_);
   // Among so many one fits a little by chance: it has to explain nearly all.

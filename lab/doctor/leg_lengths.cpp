@@ -10,12 +10,11 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double window = 1.0;              // s, of a displacement
-constexpr double least_way = 0.12;          // m in a window
-constexpr double scale_tolerance = 0.035;   // soles that slip and roll take 1 %
-constexpr double stance_tolerance = 0.02;   // links are known to 1 %
-constexpr double height_tolerance = 0.028;  // m: ground that gives way takes 2 cm
-constexpr double sure = 4;                  // standard deviations
+constexpr double window = 1.0;                  // s, of a displacement
+constexpr double least_way = 0.12;              // m in a window
+constexpr double scale_tolerance = 0.035;       // soles that slip and roll take 1 %
+constexpr double stance_tolerance = 0.02;       // links are known to 1 %
+constexpr double leg_height_tolerance = 0.028;  // m: ground that gives way takes 2 cm
 
 struct Lowest {
   std::size_t foot = 0, corner = 0;
@@ -194,7 +193,7 @@ void Examination::examine_leg_lengths() {
   bool scale_wrong = std::abs(scale - 1) > std::max(scale_tolerance, sure * sigma);
   if (stances_ && !scale_wrong) {
     const double by_stances = 1 / stances_->scale, legs = legs_under(nullptr).front().foot[0].p[0].norm();
-    const bool explains = !height || std::abs(*height - (by_stances - 1) * legs) < height_tolerance;
+    const bool explains = !height || std::abs(*height - (by_stances - 1) * legs) < leg_height_tolerance;
     if (explains && std::abs(by_stances - 1) > std::max(stance_tolerance, sure * stances_->scale_sigma)) {
       scale = by_stances;
       scale_wrong = true;
@@ -202,7 +201,7 @@ void Examination::examine_leg_lengths() {
   }
   // A LiDAR that was found elsewhere is known to some centimetres only.
   const bool moved = std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "lidar_position"; });
-  const bool height_wrong = height && std::abs(*height) > (moved ? 3 : 1) * height_tolerance;
+  const bool height_wrong = height && std::abs(*height) > (moved ? 3 : 1) * leg_height_tolerance;
   const std::string detail = fmt::format(
       "way by the legs / way by the LiDAR {:.3f}, standard deviation {:.3f}, in {} s; height of the LiDAR by the legs less that by its "
       "points {}",

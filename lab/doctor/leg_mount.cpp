@@ -7,10 +7,9 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double rotation_tolerance = 2.5;  // degrees
+constexpr double leg_rotation_tolerance = 2.5;  // degrees
 // s, with and without a LiDAR: without one, soles that roll shift it by 6 ms, soft ones by more.
-constexpr double clock_tolerance = 0.0045, alone_clock_tolerance = 0.025;
-constexpr double sure = 4;  // standard deviations
+constexpr double leg_clock_tolerance = 0.0045, alone_leg_clock_tolerance = 0.025;
 
 }  // namespace
 
@@ -77,18 +76,18 @@ void Examination::examine_leg_rotation() {
   const std::string detail = fmt::format("{:.1f} degrees from the description, standard deviation {:.1f}; {:.0f} % explained", angle,
                                          uncertain, 100 * fit.explained);
   constexpr double alone_tolerance = 12;  // degrees: legs and gyro alone
-  if (angle > std::max(stances.good ? rotation_tolerance : alone_tolerance, sure * uncertain)) {
+  if (angle > std::max(stances.good ? leg_rotation_tolerance : alone_tolerance, sure * uncertain)) {
     settle_imu_link(fit.R.inverse());
     if (!diagnosis_.findings.empty() && diagnosis_.findings.back().cause == "imu_mount_rotation") {
       diagnosis_.findings.back().turn = turn;
       diagnosis_.findings.back().evidence = "turning of the legs against the gyro's: " + detail;
     }
   } else {
-    open_ |= stances.good ? angle > rotation_tolerance : !way.empty();
+    open_ |= stances.good ? angle > leg_rotation_tolerance : !way.empty();
     check(Sensor::imu, "rotation of its mount on the robot", uncertain > 3 ? Check::Verdict::unknown : Check::Verdict::good, detail);
   }
   if (stances.good) fit.explained = 1;  // the feet stand
-  examine_leg_clock(fit, clock_method, stances.good ? clock_tolerance : alone_clock_tolerance);
+  examine_leg_clock(fit, clock_method, stances.good ? leg_clock_tolerance : alone_leg_clock_tolerance);
 }
 
 void Examination::examine_leg_clock(const MountFit& fit, double method, double tolerance) {

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <numbers>
 
+#include "kilvo/math/decompositions.hpp"
 #include "lab/doctor/examination.hpp"
 #include "lab/doctor/leg_hypotheses.hpp"
 

@@ -9,12 +9,11 @@ namespace kilvo::lab {
 namespace {
 
 // A careful mount reaches a tenth of this.
-constexpr double rotation_tolerance = 0.7;  // degrees
-constexpr double worth_a_note = 0.08;       // degrees
-constexpr double clock_tolerance = 0.0035;  // s
-constexpr double sure = 4;                  // standard deviations
-constexpr double believable = 0.2;          // m/s, that the acceleration and the way may be apart by
-constexpr double very_sure = 7;             // of a gyro whose own axes may be half a degree off
+constexpr double lidar_rotation_tolerance = 0.7;  // degrees
+constexpr double worth_a_note = 0.08;             // degrees
+constexpr double lidar_clock_tolerance = 0.0035;  // s
+constexpr double believable = 0.2;                // m/s, that the acceleration and the way may be apart by
+constexpr double very_sure = 7;                   // of a gyro whose own axes may be half a degree off
 
 double mean_thickness(const std::vector<SweepPose>& way) {
   double sum = 0, n = 0;
@@ -179,14 +178,14 @@ void Examination::examine_lidar_rotation() {
   const Eigen::Vector3d sigma = fit.rotation_sigma();
   const double uncertain = degrees(sigma.norm());
   const std::string detail = fmt::format("{:.2f} degrees from the description, standard deviation {:.2f}", angle, uncertain);
-  if (angle < std::max(rotation_tolerance, very_sure * uncertain)) {
+  if (angle < std::max(lidar_rotation_tolerance, very_sure * uncertain)) {
     const bool note = angle > worth_a_note && angle > 3 * uncertain;
     check(Sensor::lidar, "rotation of the mount",
           uncertain > 5 ? Check::Verdict::unknown
           : note        ? Check::Verdict::note
                         : Check::Verdict::good,
           detail + (note ? ": could be calibrated" : ""));
-    open_ |= angle > rotation_tolerance;
+    open_ |= angle > lidar_rotation_tolerance;
     return;
   }
   // Points that are mirrored turn as those of a LiDAR that is turned by half a turn do; their way differs.
@@ -241,7 +240,7 @@ void Examination::examine_lidar_clock() {
   refine_offset(Sensor::lidar, fit.offset, sigma, method);
   lidar_offset_ = fit.offset;
   const std::string detail = fmt::format("{:.2f} ms against the IMU, standard deviation {:.2f} ms", 1e3 * fit.offset, 1e3 * sigma);
-  if (std::abs(fit.offset) < std::max(clock_tolerance, sure * sigma)) {
+  if (std::abs(fit.offset) < std::max(lidar_clock_tolerance, sure * sigma)) {
     const bool note = std::abs(fit.offset) > 0.0008 && std::abs(fit.offset) > 3 * sigma;
     check(Sensor::lidar, "clock", note ? Check::Verdict::note : Check::Verdict::good, detail + (note ? ": could be calibrated" : ""));
     return;

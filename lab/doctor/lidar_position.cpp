@@ -10,7 +10,7 @@ namespace {
 
 constexpr double position_tolerance = 0.05;  // m
 // Standard deviations: that are of the scatter alone, and a right place was 4 of them off on 14 s of soft ground.
-constexpr double sure = 6;
+constexpr double sure_of_position = 6;
 
 }  // namespace
 
@@ -35,7 +35,7 @@ void Examination::examine_lidar_position() {
   r.changes = {{"lidar.T_imu_lidar.p", vector_text(fit.r)}};
   refinements_.push_back(std::move(r));
   bool wrong = false;
-  for (int i = 0; i < 3; ++i) wrong |= std::abs(error[i]) > std::max(position_tolerance, sure * sigma[i]);
+  for (int i = 0; i < 3; ++i) wrong |= std::abs(error[i]) > std::max(position_tolerance, sure_of_position * sigma[i]);
   const std::string detail =
       fmt::format("measured ({:.3f}, {:.3f}, {:.3f}) m, standard deviations ({:.3f}, {:.3f}, {:.3f}), described ({:.3f}, {:.3f}, {:.3f})",
                   fit.r.x(), fit.r.y(), fit.r.z(), sigma.x(), sigma.y(), sigma.z(), described.x(), described.y(), described.z());

@@ -1,16 +1,17 @@
 #include "lab/doctor/plane_grid.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
+
+#include "kilvo/math/decompositions.hpp"
 
 namespace kilvo::lab {
 namespace {
 
-constexpr double fewest = 12;   // points of a plane
-constexpr double refit = 1.25;  // times as many points as at the last fit
-constexpr double flat = 0.08;   // of the middle to the smallest eigenvalue
-constexpr double most = 20000;  // points of a voxel
+constexpr double fewest_points = 12;  // points of a plane
+constexpr double refit = 1.25;        // times as many points as at the last fit
+constexpr double flat = 0.08;         // of the middle to the smallest eigenvalue
+constexpr double most = 20000;        // points of a voxel
 
 constexpr std::size_t first_slots = 1024;
 
@@ -95,7 +96,7 @@ void PlaneGrid::insert(std::span<const Eigen::Vector3d> points) {
 void PlaneGrid::fit(Voxel& v, const Eigen::Vector3d& corner) const {
   v.fitted_n = v.n;
   const Eigen::Vector3d mean = v.sum / v.n;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eig(v.squares / v.n - mean * mean.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eig(Eigen::Matrix3d(v.squares / v.n - mean * mean.transpose()));
   const Eigen::Vector3d& e = eig.eigenvalues();
   const double spread = side_ * side_ / 200;
   v.planar = e[0] < flat * e[1] && e[1] > spread;
@@ -107,7 +108,7 @@ const GridPlane* PlaneGrid::find(const Eigen::Vector3d& p) {
   const Slot& slot = slots_[slot_of(cell.key)];
   if (slot.voxel == none) return nullptr;
   Voxel& v = voxels_[slot.voxel];
-  if (v.n < fewest) return nullptr;
+  if (v.n < fewest_points) return nullptr;
   if (v.n >= refit * v.fitted_n) fit(v, side_ * cell.at);
   return v.planar ? &v.plane : nullptr;
 }

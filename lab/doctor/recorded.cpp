@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t points_of_a_sweep = 6000;
 constexpr double leg_period = 0.0039;  // s
 constexpr double leg_step = 0.03;      // s between two stamps of a clock that the program finds
-constexpr float nearest = 0.5F;        // m: nearer points may be the robot's own arms
+constexpr float nearest_point = 0.5F;  // m: nearer points may be the robot's own arms
 
 }  // namespace
 
@@ -54,7 +54,7 @@ void Recorder::take(const LidarScan& scan) {
     const LidarPoint& p = scan.points[i];
     const Eigen::Vector3f x(p.x, p.y, p.z);
     const float range = x.norm();
-    if (!(range > nearest && range < 200)) continue;
+    if (!(range > nearest_point && range < 200)) continue;
     sweep.points.push_back({x, 1e-9F * static_cast<float>(p.offset_ns)});
   }
   if (sweep.points.size() < 50) return;

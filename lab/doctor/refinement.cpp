@@ -8,7 +8,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double sure = 3;  // standard deviations
+constexpr double significant_change = 3;  // standard deviations
 
 std::string numbers(const std::vector<double>& x) {
   std::vector<std::string> out;
@@ -28,7 +28,7 @@ Refinement refinement(Sensor sensor, const std::string& what, std::vector<double
     sigma[i] = std::hypot(sigma[i], method);
     const bool known = std::isfinite(sigma[i]) && sigma[i] <= largest_sigma;
     out.observable = out.observable && known;
-    out.significant = out.significant || (known && std::abs(change[i]) > sure * sigma[i]);
+    out.significant = out.significant || (known && std::abs(change[i]) > significant_change * sigma[i]);
   }
   out.significant = out.significant && out.observable;
   out.change = std::move(change);

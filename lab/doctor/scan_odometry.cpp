@@ -1,11 +1,11 @@
 #include "lab/doctor/scan_odometry.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
+#include "kilvo/math/decompositions.hpp"
 #include "lab/doctor/camera_fit.hpp"
 #include "lab/doctor/plane_grid.hpp"
 
@@ -16,7 +16,7 @@ constexpr double fine = 0.5, coarse = 2;  // m, sides of voxels
 constexpr double far = 8;                 // m, beyond which points go to the coarse grid only
 constexpr double sensor_noise = 0.02;     // m
 constexpr double gate = 0.5;              // m
-constexpr int iterations = 10;
+constexpr int sweep_iterations = 10;
 constexpr std::size_t used = 1500;       // points of a sweep that are registered
 constexpr std::size_t enough = 60;       // of them on planes
 constexpr double velocity_change = 1.0;  // m/s from sweep to sweep, standard deviation
@@ -35,7 +35,7 @@ struct Row {
 };
 
 // Lower triangle of sum w J J', and sum w r J.
-struct Normal {
+struct NormalSums {
   double columns[4][8] = {};  // rows 0 to 7 of the first four columns
   double corner[4][4] = {};   // rows 4 to 7 of the next four
   double last[9] = {};        // row 8
@@ -61,7 +61,7 @@ struct Normal {
   std::memcpy(sums, &sum, sizeof(sum));
 }
 
-KILVO_WIDE void add_rows(const Row* rows, std::size_t count, Normal& to) {
+KILVO_WIDE void add_rows(const Row* rows, std::size_t count, NormalSums& to) {
   for (const Row* row = rows; row != rows + count; ++row) {
     Double4 upper, lower;
     load(upper, row->J);
@@ -179,7 +179,7 @@ class Odometry {
   bool align(SweepPose& pose) {
     const Eigen::Vector3d expected = pose.v_W;
     double scale = 0.1;
-    for (int k = 0; k < iterations; ++k) {
+    for (int k = 0; k < sweep_iterations; ++k) {
       std::vector<double> distances;
       rows_.clear();
       const Eigen::Matrix3d R = pose.T_WL.R.matrix(), back = R.transpose();
@@ -198,12 +198,13 @@ class Odometry {
         const Eigen::Vector3d a = back * (arm.cross(plane->n)), &n = plane->n;
         rows_.push_back({{a.x(), a.y(), a.z(), n.x(), n.y(), n.z(), p.dt * n.x(), p.dt * n.y(), p.dt * n.z()}, weight, r});
       }
-      Normal normal;
+      NormalSums normal;
       add_rows(rows_.data(), rows_.size(), normal);
       Matrix9 H = normal.H();
       Vector9 g(normal.g);
       if (distances.size() < enough) return false;
-      pose.weakest = 3 * Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(H.block<3, 3>(3, 3)).eigenvalues()[0] / H.block<3, 3>(3, 3).trace();
+      pose.weakest = 3 * Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(Eigen::Matrix3d(H.block<3, 3>(3, 3))).eigenvalues()[0] /
+                     H.block<3, 3>(3, 3).trace();
       H.block<3, 3>(6, 6).diagonal().array() += 1 / (velocity_sigma_ * velocity_sigma_);
       g.tail<3>() += (pose.v_W - expected) / (velocity_sigma_ * velocity_sigma_);
       H.diagonal().array() += 1e-6 * H.diagonal().maxCoeff();

@@ -9,13 +9,13 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double period = 0.019;  // s between samples
+constexpr double sample_period = 0.019;  // s between samples
 // m/s, rad/s, of a sole that stands: as far as it is known before and after the first fit. Soles that roll seem to stand, too.
 constexpr double still[] = {0.15, 0.06}, still_turn[] = {0.45, 0.2};
-constexpr std::size_t shortest = 8;  // samples of a stance
-constexpr std::size_t edge = 2;      // samples at either end, where soles roll
-constexpr std::size_t fewest = 24;   // stances
-constexpr double slack = 0.02;       // s
+constexpr std::size_t shortest = 8;         // samples of a stance
+constexpr std::size_t edge = 2;             // samples at either end, where soles roll
+constexpr std::size_t fewest_stances = 24;  // stances
+constexpr double stance_slack = 0.02;       // s
 // m, rad: of the rows. A sole tilts with the load on it by a tenth of a degree, in step with the gait, while its middle stays where it is.
 constexpr double unit_p = 0.003, unit_R = 0.03;
 constexpr double nudge = 1e-3;  // rad
@@ -52,10 +52,10 @@ class Stances {
           double offset, bool with_zeros)
       : way_(way), gyro_(gyro), T_LI_(robot.imu.T_link_imu), offset_(offset) {
     if (with_zeros) joints_ = joints_that_matter(recorded, robot);
-    const std::vector<LegPose> path = leg_path(recorded, robot, hypothesis, period, nullptr);
+    const std::vector<LegPose> path = leg_path(recorded, robot, hypothesis, sample_period, nullptr);
     const auto n = static_cast<Eigen::Index>(joints_.size());
     for (const LegPose& pose : path) {
-      if (with_zeros && (!way.at(pose.t + offset - slack, gyro) || !way.at(pose.t + offset + slack, gyro))) continue;
+      if (with_zeros && (!way.at(pose.t + offset - stance_slack, gyro) || !way.at(pose.t + offset + stance_slack, gyro))) continue;
       Sample s{pose.t, {}};
       for (std::size_t f = 0; f < 2; ++f)
         s.sole[f] = {middle_of(pose.foot[f]), pose.foot[f].R_IF, Eigen::MatrixXd::Zero(3, n), Eigen::MatrixXd::Zero(3, n)};
@@ -79,7 +79,7 @@ class Stances {
     Standing out;
     std::vector<double> moving(samples_.size(), 0);
     for (std::size_t i = 1; i < samples_.size(); ++i) {
-      if (moves(i)) moving[i] = std::min(samples_[i].t - samples_[i - 1].t, 2 * period);
+      if (moves(i)) moving[i] = std::min(samples_[i].t - samples_[i - 1].t, 2 * sample_period);
       out.moving += moving[i];
     }
     for (const Stance& s : stances_) {
@@ -105,7 +105,7 @@ class Stances {
       for (std::size_t i = 0; i <= samples_.size(); ++i) {
         const std::optional<SE3> now = i < samples_.size() ? sole_at(x, i, f) : std::nullopt;
         const double dt = i > 0 && now ? samples_[i].t - samples_[i - 1].t : 1;
-        const bool stands = now && last && dt < 2 * period && (now->p - last->p).norm() < slow * dt &&
+        const bool stands = now && last && dt < 2 * sample_period && (now->p - last->p).norm() < slow * dt &&
                             (last->R.inverse() * now->R).Log().norm() < slow_turn * dt;
         if (!stands) {
           if (i >= begin + shortest + 2 * edge) stances_.push_back({f, begin + edge, i - edge});
@@ -148,8 +148,8 @@ class Stances {
   bool moves(std::size_t i) const {
     constexpr double slow = 0.05;  // m/s
     const double t = samples_[i].t + offset_;
-    const auto a = way_.at(t - slack, gyro_), b = way_.at(t + slack, gyro_);
-    return a && b && (b->p - a->p).norm() > slow * 2 * slack;
+    const auto a = way_.at(t - stance_slack, gyro_), b = way_.at(t + stance_slack, gyro_);
+    return a && b && (b->p - a->p).norm() > slow * 2 * stance_slack;
   }
 
   void differentiate(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, Eigen::Index j) {
@@ -161,7 +161,7 @@ class Stances {
         if (i == joint) q += side * nudge;
       };
       std::size_t k = 0;
-      for (const LegPose& pose : leg_path(recorded, robot, &h, period, nullptr)) {
+      for (const LegPose& pose : leg_path(recorded, robot, &h, sample_period, nullptr)) {
         while (k < samples_.size() && samples_[k].t < pose.t) ++k;
         if (k == samples_.size() || samples_[k].t != pose.t) continue;
         for (std::size_t f = 0; f < 2; ++f) {
@@ -174,7 +174,7 @@ class Stances {
   }
 
   std::optional<SE3> sole_at(const Eigen::VectorXd& x, std::size_t i, std::size_t f) const {
-    const auto T_WI = way_.at(samples_[i].t + offset_ + std::clamp(x[of_offset], -slack, slack), gyro_);
+    const auto T_WI = way_.at(samples_[i].t + offset_ + std::clamp(x[of_offset], -stance_slack, stance_slack), gyro_);
     if (!T_WI) return std::nullopt;
     const SE3 T_LI{rotation(x), T_LI_.p + x.segment<3>(of_p)};
     const Sole& sole = samples_[i].sole[f];
@@ -210,7 +210,7 @@ StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHyp
   Fit fit;
   for (int k = 0; k < passes; ++k) {
     stances.find(x, k == 0);
-    if (stances.stances() < fewest) return out;
+    if (stances.stances() < fewest_stances) return out;
     const auto rows = [&stances](const Eigen::VectorXd& at, Residuals& r) { stances.rows(at, r); };
     fit = robust_fit(rows, none, prior / std::sqrt(stances.repeated()), step, 8);
     if (!fit.good) return out;

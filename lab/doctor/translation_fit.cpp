@@ -16,10 +16,10 @@ using Matrix39 = Eigen::Matrix<double, 3, 9>;
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
 using Vector9 = Eigen::Matrix<double, 9, 1>;
 
-constexpr double bias_prior = 0.15;   // m/s^2
-constexpr double position_prior = 1;  // m
-constexpr double weak = 0.02;         // share of the sweep's information; below it the LiDAR does not know its way
-constexpr std::size_t fewest = 40;    // rows
+constexpr double accel_bias_prior = 0.15;  // m/s^2
+constexpr double position_prior = 1;       // m
+constexpr double weak = 0.02;              // share of the sweep's information; below it the LiDAR does not know its way
+constexpr std::size_t fewest_rows = 40;    // rows
 
 // Velocity and place that a constant force in the IMU frame (one column for each element of the axes) gives from a to b, in the frame of
 // the IMU at a. Each sample holds until the middle between its neighbours.
@@ -95,7 +95,7 @@ TranslationRows::TranslationRows(const std::vector<SweepPose>& poses, const std:
 }
 
 std::optional<TranslationFit> TranslationRows::fit(const Eigen::Matrix3d& axes) const {
-  if (rows_.size() < fewest) return std::nullopt;
+  if (rows_.size() < fewest_rows) return std::nullopt;
   Vector9 elements;
   for (int i = 0; i < 3; ++i) elements.segment<3>(3 * i) = axes.row(i).transpose();
   TranslationFit out;
@@ -104,7 +104,7 @@ std::optional<TranslationFit> TranslationRows::fit(const Eigen::Matrix3d& axes) 
   double scale = 0.3;
   Vector9 prior = Vector9::Zero();
   prior.head<3>().setConstant(1 / (position_prior * position_prior));
-  prior.tail<3>().setConstant(1 / (bias_prior * bias_prior));
+  prior.tail<3>().setConstant(1 / (accel_bias_prior * accel_bias_prior));
   for (int k = 0; k < 8; ++k) {
     const Matrix9 H_prior = scale * scale * Matrix9(prior.asDiagonal());
     std::vector<Block> blocks(1);

@@ -1,17 +1,17 @@
 #include "lab/doctor/turns.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+
+#include "kilvo/math/decompositions.hpp"
 
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t fewest = 30;      // intervals
-constexpr double least_turning = 0.03;  // rad/s rms, below which nothing is compared
-constexpr double bias_prior = 0.02;     // rad/s
-constexpr double resolution = 0.005;    // s, of the search for the offset
+constexpr std::size_t fewest_intervals = 30;  // intervals
+constexpr double least_turning = 0.03;        // rad/s rms, below which nothing is compared
+constexpr double gyro_bias_prior = 0.02;      // rad/s
+constexpr double resolution = 0.005;          // s, of the search for the offset
 constexpr std::size_t most_offsets = 6;
 
 struct Pair {
@@ -52,7 +52,7 @@ double median_of(std::vector<double> x) {
 
 // Outliers count as much as nine tenths of the rows allow.
 double robust_share(std::vector<double>& errors, std::vector<double>& sizes) {
-  if (errors.size() < fewest) return 0;
+  if (errors.size() < fewest_intervals) return 0;
   std::ranges::sort(errors);
   double e = 0, s = 0;
   const std::size_t n = errors.size() * 9 / 10;
@@ -79,7 +79,7 @@ TurnAgreement agree(const std::vector<Turn>& turns, const GyroPath& gyro, double
   TurnAgreement out;
   const std::vector<Pair> pairs = pairs_of(turns, gyro, offset);
   out.count = pairs.size();
-  if (pairs.size() < fewest) return out;
+  if (pairs.size() < fewest_intervals) return out;
   std::vector<double> ratios;
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   double time2 = 0;
@@ -94,7 +94,7 @@ TurnAgreement agree(const std::vector<Turn>& turns, const GyroPath& gyro, double
     const double length = p.turn->theta[0].norm();
     if (p.turn->choices == 1 && length > 0.3 * out.turning * (p.turn->b - p.turn->a)) ratios.push_back(p.gyro.norm() / length);
   }
-  out.scale = ratios.size() < fewest ? 1 : median_of(ratios);
+  out.scale = ratios.size() < fewest_intervals ? 1 : median_of(ratios);
   for (int k = 0; k < 8; ++k) {
     Eigen::Matrix3d C = Eigen::Matrix3d::Zero();
     double dot = 0, square = 0;
@@ -129,7 +129,7 @@ std::vector<double> likely_offsets(const std::vector<Turn>& turns, const GyroPat
       x.push_back(std::sqrt(gyro.rate(turn.a + offset, turn.b + offset).norm()));
       y.push_back(std::sqrt(nearest_length(turn, dt * x.back() * x.back()).norm() / dt));
     }
-    if (x.size() < fewest) continue;
+    if (x.size() < fewest_intervals) continue;
     const Eigen::Map<const Eigen::VectorXd> a(x.data(), static_cast<Eigen::Index>(x.size())), b(y.data(), a.size());
     const Eigen::VectorXd da = a.array() - a.mean(), db = b.array() - b.mean();
     const double norm = da.norm() * db.norm();
@@ -168,7 +168,7 @@ MountFit fit_mount(const std::vector<Turn>& turns, const GyroPath& gyro, const S
     }
   };
   Eigen::VectorXd start = Eigen::VectorXd::Zero(7), prior(7), step(7);
-  prior << rotation_prior, rotation_prior, rotation_prior, INFINITY, bias_prior, bias_prior, bias_prior;
+  prior << rotation_prior, rotation_prior, rotation_prior, INFINITY, gyro_bias_prior, gyro_bias_prior, gyro_bias_prior;
   step << 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3;
   out.fit = robust_fit(residuals, start, prior, step);
   out.R = R * SO3::Exp(out.fit.x.head<3>());

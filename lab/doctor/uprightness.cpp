@@ -6,11 +6,7 @@
 #include "lab/doctor/examination.hpp"
 
 namespace kilvo::lab {
-namespace {
-
-constexpr double gravity = 9.80665;  // m/s^2
-
-}  // namespace
+namespace {}  // namespace
 
 // From the feet to the hips, of any length.
 Eigen::Vector3d Examination::up_by_legs() const {

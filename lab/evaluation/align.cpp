@@ -1,11 +1,11 @@
 #include "lab/evaluation/align.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <string>
 
+#include "kilvo/math/decompositions.hpp"
 #include "lab/evaluation/decimal_time.hpp"
 
 namespace kilvo::lab {

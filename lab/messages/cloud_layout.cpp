@@ -10,7 +10,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t most_fields = 256;
+constexpr std::size_t most_cloud_fields = 256;
 
 std::optional<ScalarType> scalar_type(std::uint8_t code, std::uint32_t count) {
   if (code < 1 || code > 8) return std::nullopt;
@@ -18,20 +18,20 @@ std::optional<ScalarType> scalar_type(std::uint8_t code, std::uint32_t count) {
   return type == ScalarType::uint32 && count == 2 ? ScalarType::uint64 : type;
 }
 
-DecodeError bad(const std::string& what) { return {"sensor_msgs/PointCloud2: " + what}; }
-
 /// Rows that are claimed longer or shorter than they are ("row_step lies") are repaired where there is only one way to read them.
 Decoded<std::size_t> true_row_step(const CloudLayout& cloud) {
   const std::size_t row_bytes = cloud.width * cloud.point_step;  // both below 2^32
-  if (row_bytes > cloud.data.size()) return bad("a row of points is longer than the data");
+  if (row_bytes > cloud.data.size()) return bad_cloud("a row of points is longer than the data");
   if (cloud.height <= 1) return row_bytes;
   const bool as_claimed = cloud.row_step >= row_bytes && cloud.row_step <= (cloud.data.size() - row_bytes) / (cloud.height - 1);
   if (as_claimed) return cloud.row_step;
   if (row_bytes > 0 && cloud.height == cloud.data.size() / row_bytes && cloud.data.size() % row_bytes == 0) return row_bytes;
-  return bad("row_step " + std::to_string(cloud.row_step) + " does not fit " + std::to_string(cloud.data.size()) + " bytes of data");
+  return bad_cloud("row_step " + std::to_string(cloud.row_step) + " does not fit " + std::to_string(cloud.data.size()) + " bytes of data");
 }
 
 }  // namespace
+
+DecodeError bad_cloud(const std::string& what) { return {"sensor_msgs/PointCloud2: " + what}; }
 
 std::size_t size_of(ScalarType type) {
   constexpr std::array<std::size_t, 10> sizes{0, 1, 1, 2, 2, 4, 4, 4, 8, 8};
@@ -51,7 +51,7 @@ const CloudField* CloudLayout::find(std::string_view name) const {
 Decoded<CloudLayout> read_cloud_layout(const WireMessage& message) {
   const auto m = read_message<PointCloud2Message>(message);
   if (!m) return DecodeError{m.reason()};
-  if (m->point_fields.size() > most_fields) return bad("claims " + std::to_string(m->point_fields.size()) + " fields");
+  if (m->point_fields.size() > most_cloud_fields) return bad_cloud("claims " + std::to_string(m->point_fields.size()) + " fields");
   CloudLayout cloud;
   cloud.stamp = m->header.stamp;
   cloud.height = m->height;
@@ -65,11 +65,11 @@ Decoded<CloudLayout> read_cloud_layout(const WireMessage& message) {
   cloud.data = m->data.raw;  // is_dense is not to be relied upon
 
   if (cloud.width == 0 || cloud.height == 0) cloud.width = cloud.height = 0;
-  if (cloud.width != 0 && cloud.point_step == 0) return bad("point_step is 0");
+  if (cloud.width != 0 && cloud.point_step == 0) return bad_cloud("point_step is 0");
   const auto row_step = true_row_step(cloud);
   if (!row_step) return DecodeError{row_step.reason()};
   cloud.row_step = *row_step;
-  if (cloud.size() > most_points_in_a_cloud) return bad("claims " + std::to_string(cloud.size()) + " points");
+  if (cloud.size() > most_points_in_a_cloud) return bad_cloud("claims " + std::to_string(cloud.size()) + " points");
   std::erase_if(cloud.fields, [&](const CloudField& f) { return f.offset + size_of(f.type) > cloud.point_step; });
   return cloud;
 }

@@ -35,6 +35,9 @@ struct CloudLayout {
   const CloudField* find(std::string_view name) const;
 };
 
+/// Says of which type it is.
+DecodeError bad_cloud(const std::string& what);
+
 /// Fails unless all the points that the message claims are really in it.
 Decoded<CloudLayout> read_cloud_layout(const WireMessage& message);
 

@@ -16,6 +16,9 @@ enum class Encoding : std::uint8_t {
   other,  // nothing that KILVO reads
 };
 
+inline constexpr std::size_t encapsulation_bytes = 4;  // of CDR
+inline constexpr std::size_t most_padding = 7;         // writers of CDR that align the end of a message do so to 4 or 8 bytes
+
 inline const char* name_of(Encoding encoding) {
   constexpr const char* names[] = {"ros1", "cdr", "other"};
   return names[static_cast<int>(encoding)];

@@ -8,8 +8,6 @@ namespace {
 using Kind = SchemaField::Kind;
 using Array = SchemaField::Array;
 
-constexpr std::size_t encapsulation_bytes = 4;
-constexpr std::size_t most_padding = 7;
 constexpr std::size_t most_growth = 8;  // a message that becomes larger than this many times its size is not one
 
 class Conversion {

@@ -12,7 +12,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::string_view point_cloud2 = "sensor_msgs/PointCloud2";
+constexpr std::string_view cloud_type = "sensor_msgs/PointCloud2";
 constexpr std::string_view hg_low_state = "unitree_hg/LowState", hg_imu_state = "unitree_hg/IMUState";
 constexpr std::string_view go_low_state = "unitree_go/LowState";
 
@@ -42,7 +42,7 @@ const std::vector<std::string_view>& accepted_types(Sensor sensor) {
   static const std::array<std::vector<std::string_view>, sensor_count> types{{
       {"sensor_msgs/Imu", hg_low_state, hg_imu_state, go_low_state},
       {"sensor_msgs/JointState", hg_low_state, go_low_state},
-      {point_cloud2, "livox_ros_driver/CustomMsg", "livox_ros_driver2/CustomMsg"},
+      {cloud_type, "livox_ros_driver/CustomMsg", "livox_ros_driver2/CustomMsg"},
       {"sensor_msgs/Image", "sensor_msgs/CompressedImage"},
   }};
   return types[static_cast<std::size_t>(sensor)];
@@ -69,7 +69,7 @@ Decoded<DecodedMeasurement> decode_measurement(Sensor sensor, std::string_view t
     case Sensor::legs:
       return plain(decode_joint_state(message));
     case Sensor::lidar:
-      return timed(type == point_cloud2 ? decode_point_cloud2(message, point_time) : decode_livox(message, point_time));
+      return timed(type == cloud_type ? decode_point_cloud2(message, point_time) : decode_livox(message, point_time));
     case Sensor::camera:
       break;
   }
@@ -77,11 +77,11 @@ Decoded<DecodedMeasurement> decode_measurement(Sensor sensor, std::string_view t
 }
 
 Decoded<CloudTimes> observe_cloud(std::string_view type, const WireMessage& message) {
-  return type == point_cloud2 ? observe_point_cloud2(message) : observe_livox(message);
+  return type == cloud_type ? observe_point_cloud2(message) : observe_livox(message);
 }
 
 Decoded<PointTimeFormat> detect_point_time_of(std::string_view type, const std::vector<CloudTimes>& clouds, Duration nominal_period) {
-  return type == point_cloud2 ? detect_point_time(clouds, nominal_period) : detect_livox_point_time(clouds);
+  return type == cloud_type ? detect_point_time(clouds, nominal_period) : detect_livox_point_time(clouds);
 }
 
 }  // namespace kilvo::lab

@@ -12,8 +12,6 @@ namespace {
 constexpr double farthest_ns = static_cast<double>(farthest_point_time.count());
 constexpr std::int32_t no_offset = std::numeric_limits<std::int32_t>::max();  // marks a point whose time is absurd
 
-DecodeError bad(const std::string& what) { return {"sensor_msgs/PointCloud2: " + what}; }
-
 std::string field_names(const CloudLayout& cloud) {
   std::string names;
   for (const auto& field : cloud.fields) names.append(" ").append(field.name);
@@ -121,11 +119,11 @@ Decoded<DecodedScan> decode_point_cloud2(const WireMessage& message, const Point
   DecodedScan decoded;
   auto& points = decoded.scan.points;
   decoded.scan.t = cloud->stamp;
-  if (!read_geometry(*cloud, points)) return bad("x, y or z is missing among the fields:" + field_names(*cloud));
+  if (!read_geometry(*cloud, points)) return bad_cloud("x, y or z is missing among the fields:" + field_names(*cloud));
   if (format.reference == TimeReference::none) return decoded;
 
   const CloudField* time = cloud->find(format.field);
-  if (time == nullptr) return bad("the point time " + format.field + " is missing among the fields:" + field_names(*cloud));
+  if (time == nullptr) return bad_cloud("the point time " + format.field + " is missing among the fields:" + field_names(*cloud));
   read_offsets(*cloud, *time, format, points);
   decoded.absurd_times = std::erase_if(points, [](const LidarPoint& p) { return p.offset_ns == no_offset; });
   return decoded;
@@ -137,7 +135,7 @@ Decoded<CloudTimes> observe_point_cloud2(const WireMessage& message) {
   CloudTimes times{cloud->stamp, cloud->size(), {}, {}};
   for (const auto& field : cloud->fields) times.fields.emplace_back(field.name);
   std::vector<LidarPoint> points;
-  if (!read_geometry(*cloud, points)) return bad("x, y or z is missing among the fields:" + field_names(*cloud));
+  if (!read_geometry(*cloud, points)) return bad_cloud("x, y or z is missing among the fields:" + field_names(*cloud));
   for (const std::string_view name : point_time_names) {
     const CloudField* field = cloud->find(name);
     if (field == nullptr) continue;

@@ -3,9 +3,6 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t encapsulation_bytes = 4;
-constexpr std::size_t most_padding = 7;  // writers that align the end of a message do so to 4 or 8 bytes
-
 Bytes body_of(const WireMessage& message) {
   if (message.encoding == Encoding::ros1) return message.bytes;
   return message.bytes.size() < encapsulation_bytes ? Bytes{} : message.bytes.subspan(encapsulation_bytes);

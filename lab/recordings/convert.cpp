@@ -4,11 +4,10 @@
 #include <memory>
 
 #include "lab/messages/message_schema.hpp"
+#include "lab/recordings/topic_choice.hpp"
 
 namespace kilvo::lab {
 namespace {
-
-std::string_view without_slash(std::string_view topic) { return topic.starts_with('/') ? topic.substr(1) : topic; }
 
 /// What becomes of the messages of one channel.
 struct Route {

@@ -9,6 +9,10 @@
 
 namespace kilvo::lab {
 
+inline constexpr std::size_t window_bytes = 1 << 16;  // of a FileWindow that walks through a file
+/// Who seeks the next sound place looks at the first so many bytes, for it is often near, then at twice as many, up to the last.
+inline constexpr std::size_t first_block_bytes = 4 << 10, most_block_bytes = 1 << 20;
+
 /// A file opened for reading, or bytes in memory that stand for one (tests, fuzzers).
 class FileBytes {
  public:

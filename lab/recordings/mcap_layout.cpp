@@ -8,11 +8,10 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t window_bytes = 1 << 16;
 constexpr std::uint64_t most_region_bytes = 1 << 20;  // records outside of chunks are read so much at a time
-constexpr std::size_t most_chunks = 1'000'000;
+constexpr std::size_t most_mcap_chunks = 1'000'000;
 constexpr std::uint64_t most_definition_record = 4 << 20;
-constexpr std::size_t index_entry_bytes = 16;  // time, offset
+constexpr std::size_t mcap_index_entry_bytes = 16;  // time, offset
 
 /// Walks through the records of a file and notes what it meets.
 class McapWalk {
@@ -21,7 +20,7 @@ class McapWalk {
 
   McapLayout run() {
     std::uint64_t at = mcap_magic.size();
-    while (at < file_.size() && layout_.chunks.size() < most_chunks && !closed_) {
+    while (at < file_.size() && layout_.chunks.size() < most_mcap_chunks && !closed_) {
       const auto next = step(at);
       if (!next) break;
       at = *next;
@@ -163,12 +162,12 @@ class McapWalk {
     ByteReader reader(window_.view(record.data, std::min<std::uint64_t>(record.size, 6)));
     const auto channel = reader.read<std::uint16_t>();
     const std::uint64_t bytes = reader.read<std::uint32_t>();
-    if (!reader.ok() || bytes + 6 > record.size || bytes % index_entry_bytes != 0) return false;
+    if (!reader.ok() || bytes + 6 > record.size || bytes % mcap_index_entry_bytes != 0) return false;
     TimesSummary times;
     for (std::uint64_t done = 0; done < bytes;) {
       const auto piece = static_cast<std::size_t>(std::min<std::uint64_t>(bytes - done, window_bytes));
       ByteReader entries(window_.view(record.data + 6 + done, piece));
-      for (std::size_t i = 0; i < piece / index_entry_bytes; ++i) {
+      for (std::size_t i = 0; i < piece / mcap_index_entry_bytes; ++i) {
         times.add(recorded_time(entries.read<std::uint64_t>()));
         entries.skip(8);
       }

@@ -8,8 +8,6 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t first_block_bytes = 4 << 10;  // the next record is often near
-constexpr std::size_t most_block_bytes = 1 << 20;
 constexpr std::size_t look = mcap_record_head + most_chunk_head_bytes;  // bytes that are looked at
 constexpr Duration near = std::chrono::hours(1);
 

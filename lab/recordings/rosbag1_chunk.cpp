@@ -7,9 +7,6 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t window_bytes = 1 << 16;
-constexpr std::size_t most_connection_bytes = 4 << 20;
-
 bool is_compressed(const BagChunk& chunk) { return chunk.compression != "none"; }
 
 }  // namespace

@@ -9,9 +9,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t window_bytes = 1 << 16;
-constexpr std::size_t index_entry_bytes = 12;  // time, offset in the chunk
-constexpr std::uint64_t most_connection_bytes = 4 << 20;
+constexpr std::size_t bag_index_entry_bytes = 12;  // time, offset in the chunk
 
 /// Walks through the records of a file and notes what it meets.
 class Walk {
@@ -146,11 +144,12 @@ class Walk {
     saw_index_ = true;
     const auto& header = record.header;
     if (!open_ || !header.connection || !header.count || index_.size() >= most_connections) return false;
-    if (record.data_size != std::uint64_t{*header.count} * index_entry_bytes) return false;
+    if (record.data_size != std::uint64_t{*header.count} * bag_index_entry_bytes) return false;
     const std::uint32_t connection = *header.connection;
     std::uint64_t left = record.data_size, at = record.data_offset;
     while (left > 0) {
-      const auto piece = static_cast<std::size_t>(std::min<std::uint64_t>(left, window_bytes / index_entry_bytes * index_entry_bytes));
+      const auto piece =
+          static_cast<std::size_t>(std::min<std::uint64_t>(left, window_bytes / bag_index_entry_bytes * bag_index_entry_bytes));
       ByteReader entries(window_.view(at, piece));
       if (entries.remaining() < piece) return false;
       TimesSummary& times = index_[connection];

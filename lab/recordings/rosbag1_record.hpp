@@ -30,6 +30,8 @@ std::optional<BagRecordHeader> parse_bag_header(Bytes header);
 
 /// Headers longer than this are taken for damage.
 inline constexpr std::size_t most_header_bytes = 1 << 20;
+/// Nor is a connection longer than this.
+inline constexpr std::size_t most_connection_bytes = 4 << 20;
 
 /// From the header and the data of a connection record.
 std::optional<Channel> parse_connection(const BagRecordHeader& header, Bytes data);

@@ -7,8 +7,6 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t first_block_bytes = 4 << 10;  // the next chunk is often near
-constexpr std::size_t most_block_bytes = 1 << 20;
 constexpr std::size_t longest_chunk_header = 128;  // three short fields: 40 bytes as everybody writes them
 
 // The one field that every chunk header has, wherever it stands among the others: length 4, op=5.

@@ -10,8 +10,6 @@
 namespace kilvo::lab {
 namespace {
 
-std::string_view without_slash(std::string_view topic) { return topic.starts_with('/') ? topic.substr(1) : topic; }
-
 std::string accepted_text(Sensor sensor) {
   std::string text;
   for (const auto type : accepted_types(sensor)) text.append(text.empty() ? "" : " or ").append(type);

@@ -3,11 +3,14 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 
 #include "kilvo/sensors/measurement.hpp"
 #include "lab/recordings/recording_reader.hpp"
 
 namespace kilvo::lab {
+
+inline std::string_view without_slash(std::string_view topic) { return topic.starts_with('/') ? topic.substr(1) : topic; }
 
 /// True when `pattern` from the configuration means `topic`: the same name (with or without the leading slash) or, for a camera, the
 /// same name with `/compressed` behind it.

@@ -7,7 +7,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t buckets = 1200;
+constexpr std::size_t contact_buckets = 1200;
 
 /// The stances of a foot as [begin, end, class, text], s. What has no end known (legs lost) ends with its samples.
 Json spans(const TimeBase& time, std::span<const ContactSample> samples, Foot foot) {
@@ -54,7 +54,7 @@ Json clearance(const TimeBase& time, const std::vector<ContactRow>& contacts) {
     t.push_back(time.seconds(row.sample.t));
     for (const Foot foot : {left_foot, right_foot}) columns[foot].push_back(row.clearance[foot] * 1e3);
   }
-  const auto kept = thin(columns, buckets);
+  const auto kept = thin(columns, contact_buckets);
   Json lines = Json::array();
   for (const Foot foot : {left_foot, right_foot})
     lines.push_back(line(foot_names[foot], foot_names[foot], column(t, kept, 3), column(columns[foot], kept, 1)));

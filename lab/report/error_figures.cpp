@@ -8,7 +8,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t buckets = 800;
+constexpr std::size_t error_buckets = 800;
 constexpr double degrees = 180 / std::numbers::pi;
 constexpr const char* axis_names[] = {"x", "y", "z"};
 
@@ -71,7 +71,7 @@ Json axis_panels(const std::vector<double>& t, const std::array<std::vector<doub
   Json panels = Json::array();
   for (std::size_t i = 0; i < 3; ++i) {
     const std::vector<std::vector<double>> columns{scaled(errors[i], unit.scale), scaled(bands[i], unit.scale)};
-    const auto kept = thin(columns, buckets);
+    const auto kept = thin(columns, error_buckets);
     Json one = panel(axis_names[i], unit.name);
     one["lines"].push_back(
         line(std::string("error ") + axis_names[i], axis_names[i], column(t, kept, 3), column(columns[0], kept, unit.digits)));
@@ -90,7 +90,7 @@ Figures error_figures(const TimeBase& time, const Way& way, const std::vector<St
   Json size = figure("lines", "error", "error", "Error over time",
                      "Distance from the truth and angle to it, the two laid on each other by least squares.");
   const std::vector<std::vector<double>> columns{scaled(e.aligned_m, unit.scale), e.aligned_deg};
-  const auto kept = thin(columns, buckets);
+  const auto kept = thin(columns, error_buckets);
   size["panels"] = {panel("position", unit.name), panel("rotation", "deg")};
   size["panels"][0]["lines"].push_back(line("position", "estimate", column(e.t, kept, 3), column(columns[0], kept, unit.digits)));
   size["panels"][1]["lines"].push_back(line("rotation", "estimate", column(e.t, kept, 3), column(columns[1], kept, 5)));

@@ -7,15 +7,15 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t buckets = 1000;
+constexpr std::size_t path_buckets = 1000;
 constexpr Duration even_period = std::chrono::milliseconds(50);
 
-struct Curve {
+struct PathCurve {
   std::vector<double> t, x, y;
 };
 
-Json curve_line(const char* name, const char* role, const Curve& curve) {
-  const auto kept = thin(std::vector{curve.x, curve.y}, buckets);
+Json curve_line(const char* name, const char* role, const PathCurve& curve) {
+  const auto kept = thin(std::vector{curve.x, curve.y}, path_buckets);
   Json out = line(name, role, column(curve.x, kept, 4), column(curve.y, kept, 4));
   out["t"] = column(curve.t, kept, 3);
   return out;
@@ -36,7 +36,7 @@ Json plane(const char* id, const char* title, const char* note, const std::vecto
   out["equal"] = up != 2;
   out["lines"] = Json::array();
   for (const auto& [points, name, role] : {std::tuple(&truth, "truth", "truth"), std::tuple(&estimate, "estimate", "estimate")}) {
-    Curve curve;
+    PathCurve curve;
     for (const TimedPoint& point : *points) {
       curve.t.push_back(point.t);
       curve.x.push_back(point.p[across]);

@@ -5,7 +5,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t buckets = 600;
+constexpr std::size_t sensor_buckets = 600;
 
 struct Intervals {
   std::vector<double> t, ms;
@@ -34,7 +34,7 @@ Intervals intervals_of(const TimeBase& time, std::span<const StampedPose> poses)
 
 /// The longest of each part: what is short is not a gap.
 std::vector<std::size_t> longest(const std::vector<double>& ms) {
-  const std::size_t parts = std::min(buckets, ms.size());
+  const std::size_t parts = std::min(sensor_buckets, ms.size());
   std::vector<std::size_t> kept;
   for (std::size_t part = 0; part < parts; ++part) {
     const auto begin = ms.begin() + static_cast<std::ptrdiff_t>(part * ms.size() / parts);

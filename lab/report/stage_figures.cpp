@@ -8,7 +8,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t buckets = 500;
+constexpr std::size_t stage_buckets = 500;
 
 struct Stage {
   std::vector<double> t, us;
@@ -74,7 +74,7 @@ Figures stage_figures(const TimeBase& time, const std::vector<StageRow>& timing)
   over_time["panels"] = Json::array();
   std::size_t number = 0;
   for (const auto& [name, stage] : stages) {
-    const auto kept = thin(std::span(&stage.us, 1), buckets);
+    const auto kept = thin(std::span(&stage.us, 1), stage_buckets);
     const Json curve = line(name, std::to_string(number++), column(stage.t, kept, 3), column(stage.us, kept, 1));
     over_time["panels"].push_back(
         {{"label", name}, {"unit", "µs"}, {"lines", Json::array({curve})}, {"bands", Json::array()}, {"from_zero", true}});

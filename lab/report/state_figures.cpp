@@ -7,7 +7,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t buckets = 600;
+constexpr std::size_t state_buckets = 600;
 constexpr const char* axis_names[] = {"x", "y", "z"};
 
 using Columns = std::vector<std::vector<double>>;
@@ -20,7 +20,7 @@ Columns columns_of(const std::vector<StateRow>& states, Eigen::Vector3d StateRow
 }
 
 Json axis_lines(const std::vector<double>& t, const Columns& columns, int digits) {
-  const auto kept = thin(columns, buckets);
+  const auto kept = thin(columns, state_buckets);
   Json lines = Json::array();
   for (std::size_t i = 0; i < 3; ++i)
     lines.push_back(line(axis_names[i], axis_names[i], column(t, kept, 3), column(columns[i], kept, digits)));

@@ -8,7 +8,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // The six faces of an axis-aligned box.
 void add_box(std::vector<Rectangle>& out, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
@@ -30,11 +30,11 @@ double awake(double s, double still) {
 // First and second derivative by central differences of fourth order; the path is smooth on the scale of h.
 constexpr double h = 1e-3;
 template <class F>
-auto first_derivative(F f, double s) {
+auto rate_of(F f, double s) {
   return ((f(s - 2 * h) - 8 * f(s - h) + 8 * f(s + h) - f(s + 2 * h)) / (12 * h)).eval();
 }
 template <class F>
-auto second_derivative(F f, double s) {
+auto second_rate_of(F f, double s) {
   return ((-f(s - 2 * h) + 16 * f(s - h) - 30 * f(s) + 16 * f(s + h) - f(s + 2 * h)) / (12 * h * h)).eval();
 }
 
@@ -70,7 +70,7 @@ SE3 AnalyticRoom::pose_at(double s) const {
 SE3 AnalyticRoom::truth(Time t) const { return pose_at(seconds_of(t)); }
 
 Eigen::Vector3d AnalyticRoom::velocity(Time t) const {
-  return first_derivative([this](double x) { return pose_at(x).p; }, seconds_of(t));
+  return rate_of([this](double x) { return pose_at(x).p; }, seconds_of(t));
 }
 
 Eigen::Vector3d AnalyticRoom::gaussian() {
@@ -81,9 +81,9 @@ Eigen::Vector3d AnalyticRoom::gaussian() {
 
 ImuSample AnalyticRoom::imu_at(double s) {
   const SE3 T = pose_at(s);
-  const Eigen::Vector3d accel = second_derivative([this](double x) { return pose_at(x).p; }, s);
+  const Eigen::Vector3d accel = second_rate_of([this](double x) { return pose_at(x).p; }, s);
   // omega from Log(R(s)' R(s + x)) / x at x = 0.
-  const Eigen::Vector3d omega = first_derivative([&](double x) { return (T.R.inverse() * pose_at(x).R).Log(); }, s);
+  const Eigen::Vector3d omega = rate_of([&](double x) { return (T.R.inverse() * pose_at(x).R).Log(); }, s);
   const double root_rate = std::sqrt(config_.imu_rate);
   ImuSample out;
   out.t = start_ + from_seconds(s);

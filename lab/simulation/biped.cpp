@@ -8,11 +8,11 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr std::array leg_names{"hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll"};
 constexpr std::array leg_axes{1, 0, 2, 1, 1, 0};  // x, y or z of each joint
 
-SO3 turn(int axis, double angle) { return SO3::Exp(Eigen::Vector3d::Unit(axis) * angle); }
+SO3 turn_about(int axis, double angle) { return SO3::Exp(Eigen::Vector3d::Unit(axis) * angle); }
 
 JointLimit limit_of(Side side, int joint) {
   const JointLimit limit = leg_limits()[static_cast<std::size_t>(joint)];
@@ -100,7 +100,7 @@ LegSolution solve_leg(const BipedShape& shape, Side side, const SE3& T_pelvis_fo
   const double in_shin = std::asin(a * std::sin(knee) / distance);  // between the shin and the line from ankle to hip
   const double ankle_roll = std::atan2(r.y(), r.z());
   const double ankle_pitch = -std::atan2(r.x(), std::hypot(r.y(), r.z())) - in_shin;
-  const Eigen::Matrix3d hip = (T_pelvis_foot.R * turn(0, -ankle_roll) * turn(1, -ankle_pitch - knee)).matrix();
+  const Eigen::Matrix3d hip = (T_pelvis_foot.R * turn_about(0, -ankle_roll) * turn_about(1, -ankle_pitch - knee)).matrix();
   const double hip_pitch = std::atan2(hip(0, 2), hip(2, 2)), hip_roll = std::asin(std::clamp(-hip(1, 2), -1.0, 1.0));
   const double hip_yaw = std::atan2(hip(1, 0), hip(1, 1));
   out.angles = {hip_pitch, hip_roll, hip_yaw, knee, ankle_pitch, ankle_roll};
@@ -109,9 +109,9 @@ LegSolution solve_leg(const BipedShape& shape, Side side, const SE3& T_pelvis_fo
 }
 
 SE3 foot_in_pelvis(const BipedShape& shape, Side side, const LegAngles& q) {
-  const SE3 thigh{turn(1, q[0]) * turn(0, q[1]) * turn(2, q[2]), shape.hip_of(side)};
-  const SE3 shin{turn(1, q[3]), {0, 0, -shape.thigh}};
-  const SE3 foot{turn(1, q[4]) * turn(0, q[5]), {0, 0, -shape.shin}};
+  const SE3 thigh{turn_about(1, q[0]) * turn_about(0, q[1]) * turn_about(2, q[2]), shape.hip_of(side)};
+  const SE3 shin{turn_about(1, q[3]), {0, 0, -shape.thigh}};
+  const SE3 foot{turn_about(1, q[4]) * turn_about(0, q[5]), {0, 0, -shape.shin}};
   return thigh * shin * foot;
 }
 

@@ -11,6 +11,7 @@
 namespace kilvo::lab {
 
 enum class Side : std::uint8_t { left, right };
+constexpr std::size_t index_of(Side side) { return side == Side::left ? 0 : 1; }
 constexpr double sign_of(Side side) { return side == Side::left ? 1.0 : -1.0; }
 
 inline constexpr int leg_joint_count = 6;

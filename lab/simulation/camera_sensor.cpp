@@ -4,23 +4,20 @@
 #include <cmath>
 #include <numbers>
 
+#include "lab/simulation/no_sum.hpp"
 #include "lab/simulation/random.hpp"
 
 namespace kilvo::lab {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr std::uint64_t stream = 41;
+using std::numbers::pi;
+constexpr std::uint64_t image_stream = 41;
 constexpr std::size_t draws = 4096;  // of the noise table: 12 bits choose one
 
 // A pixel at an edge is seen by rays, at these quantiles of the Gaussian that blurs; what their number leaves out is in each of them. None
 // is a pixel away: so a pixel whose neighbours see what it sees needs none.
 constexpr std::array quantiles{-1.15, -0.32, 0.32, 1.15};
 constexpr double blur_of_ray = 0.53;
-
-struct NoSum {
-  NoSum& operator+=(const NoSum&) { return *this; }
-};
 
 Eigen::Vector2d distort(const std::array<double, 4>& k, const Eigen::Vector2d& x) {
   const double r2 = x.squaredNorm(), radial = 1 + r2 * (k[0] + r2 * k[1]);
@@ -58,7 +55,7 @@ CameraSensor::CameraSensor(const SimulatorConfig& config, const World& world) : 
   for (int v = -1; v <= m.height; ++v) {
     for (int u = -1; u <= m.width; ++u) directions_.emplace_back(unproject(m, {u, v}).cast<float>());
   }
-  Random random(config.seed, stream);
+  Random random(config.seed, image_stream);
   double sum = 0, squares = 0;
   std::vector<double> table(draws);
   for (double& x : table) x = random.gaussian(), sum += x;
@@ -148,7 +145,7 @@ void CameraSensor::expose(std::int64_t index, const Colour& brightness, std::siz
     const std::size_t i = first + k, width = static_cast<std::size_t>(m.width);
     const Eigen::Vector2d pixel(static_cast<double>(i % width), static_cast<double>(i / width));
     const float shade = errors ? errors->shade((pixel - middle).squaredNorm() / middle.squaredNorm()) : 1;
-    std::uint64_t bits = Random(config_.seed, stream + 1, static_cast<std::uint64_t>(index) * 10'000'019 + i).bits();
+    std::uint64_t bits = Random(config_.seed, image_stream + 1, static_cast<std::uint64_t>(index) * 10'000'019 + i).bits();
     for (std::size_t c = 0; c < 3; ++c, bits >>= 12) {
       const float grey = shade * brightness[static_cast<int>(c)] * light[k][static_cast<int>(c)];
       const float linear = grey + std::sqrt(read + photon * grey) * gaussian_[bits % draws];

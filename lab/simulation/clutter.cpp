@@ -11,7 +11,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr std::uint64_t stream = 60;
+constexpr std::uint64_t clutter_stream = 60;
 constexpr double clearance = 0.6;  // m, from the way of the pelvis: the arms of the robot do not touch
 constexpr double around = 4;       // m beyond the way: what is farther is behind other things
 
@@ -67,7 +67,7 @@ Area where(const Scene& scene, const std::vector<Vector2d>& way) {
 
 Scene cluttered(Scene scene, const Walk& walk, int objects, std::uint64_t seed) {
   if (objects <= 0) return scene;
-  Random random(seed, stream);
+  Random random(seed, clutter_stream);
   const std::size_t leaves = scene.add({Pattern::rough, {0.05F, 0.12F, 0.03F}, {0.40F, 0.60F, 0.20F}, 0.45});
   const std::size_t card = scene.add({Pattern::rough, {0.30F, 0.22F, 0.12F}, {0.65F, 0.50F, 0.32F}, 0.35});
   const std::vector<Vector2d> way = way_of(walk);

@@ -8,8 +8,6 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr std::size_t index_of(Side side) { return side == Side::left ? 0 : 1; }
-
 class Planner {
  public:
   Planner(const BipedShape& shape, const Ground& ground, const Place& start) : shape_(shape), ground_(ground), place_(start) {

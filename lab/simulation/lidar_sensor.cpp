@@ -5,14 +5,15 @@
 #include <cmath>
 #include <numbers>
 
+#include "lab/simulation/no_sum.hpp"
 #include "lab/simulation/random.hpp"
+#include "lab/simulation/units.hpp"
 
 namespace kilvo::lab {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr double degree = pi / 180;
-constexpr std::uint64_t stream = 31;
+using std::numbers::pi;
+constexpr std::uint64_t ray_stream = 31;
 
 Eigen::Vector3d from_angles(double azimuth, double elevation) {
   return {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation)};
@@ -28,10 +29,6 @@ bool hits_capsule(const Eigen::Vector3d& o, const Eigen::Vector3d& d, const Eige
   const double t = std::max(0.0, s * m - l);
   return (w + t * d - s * axis).squaredNorm() < radius * radius;
 }
-
-struct NoSum {
-  NoSum& operator+=(const NoSum&) { return *this; }
-};
 
 }  // namespace
 
@@ -63,7 +60,7 @@ LidarSensor::LidarSensor(const SimulatorConfig& config, const World& world, doub
     : config_(config),
       world_(world),
       max_range_(range_limit > 0 ? std::min(range_limit, config.lidar.max_range) : config.lidar.max_range),
-      phase_(Random(config.seed, stream).uniform(0, 2 * pi)) {}
+      phase_(Random(config.seed, ray_stream).uniform(0, 2 * pi)) {}
 
 // What sends enough light back to be seen.
 std::optional<Hit> LidarSensor::echo(const Ray& ray) const {
@@ -78,7 +75,7 @@ std::optional<Hit> LidarSensor::echo(const Ray& ray) const {
 double LidarSensor::range_of(const Ray& ray, const Hit& hit, double noise) const {
   const auto& errors = config_.errors.lidar;
   if (!errors) return hit.range + config_.lidar.range_noise * noise;
-  Random random(config_.seed, stream + 2, ray.name);
+  Random random(config_.seed, ray_stream + 2, ray.name);
   if (random.uniform() < errors->dropout) return 0;
   const double aside = errors->footprint / 2;
   const Eigen::Vector3d within(random.uniform(-aside, aside), random.uniform(-aside, aside), random.uniform(-aside, aside));
@@ -111,7 +108,7 @@ LidarScan LidarSensor::scan(std::int64_t index, double begin, const std::functio
     const Ray ray{from, (way + share * (ends[1].R * direction - way)).normalized(), static_cast<std::uint64_t>(index) * 1'000'003 + i};
     const auto hit = echo(ray);
     if (!hit) return;
-    Random random(config_.seed, stream + 1, ray.name);
+    Random random(config_.seed, ray_stream + 1, ray.name);
     const double range = range_of(ray, *hit, random.gaussian());
     const Eigen::Vector3d tilt = model.angle_noise * random.gaussian3();
     put((range * (direction + tilt - tilt.dot(direction) * direction).normalized()).cast<float>(),

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "lab/simulation/random.hpp"
+#include "lab/simulation/units.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -13,7 +14,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double degree = std::numbers::pi / 180;
 constexpr double g = 9.80665;  // m/s^2
 
 struct Named {
@@ -24,7 +24,7 @@ constexpr Named table[] = {{"lidar", &RoughParts::lidar}, {"scene", &RoughParts:
                            {"legs", &RoughParts::legs},   {"camera", &RoughParts::camera}, {"mount", &RoughParts::mount},
                            {"time", &RoughParts::time}};
 
-enum Stream : std::uint8_t { imu_stream = 50, camera_stream, mount_stream };
+enum RoughStream : std::uint8_t { imu_stream = 50, camera_stream, mount_stream };
 
 // Draws of one part at one level.
 struct Draw {

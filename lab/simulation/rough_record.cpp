@@ -1,26 +1,27 @@
 #include "lab/simulation/rough_record.hpp"
 
 #include <fmt/format.h>
-#include <numbers>
+
+#include "lab/simulation/units.hpp"
 
 namespace kilvo::lab {
 namespace {
 
 // Numbers in brackets; a matrix row by row.
 template <class Numbers>
-std::string list_of(const Numbers& numbers) {
+std::string listed(const Numbers& numbers) {
   std::string out;
   for (const double x : numbers) out += fmt::format("{}{:.7g}", out.empty() ? "" : ", ", x);
   return "[" + out + "]";
 }
-std::string list_of(const Eigen::Matrix3d& m) { return list_of(m.transpose().reshaped()); }
+std::string listed(const Eigen::Matrix3d& m) { return listed(m.transpose().reshaped()); }
 
 std::string imu_lines(const SimulatorConfig& config, const ImuErrors& e) {
   return fmt::format(
       "imu:\n  gyro_matrix: {}  # shown = matrix * true\n  accel_matrix: {}\n  g_sensitivity: {}  # rad/s per m/s^2\n"
       "  gyro_warming: {}  # rad/s, of the bias, with this time constant, s:\n  warm_up: {}\n  accel_warming: {}  # m/s^2\n"
       "  accel_range: {:.7g}  # m/s^2\n  vibration: {:.7g}  # m/s^2 rms on each axis while walking\n",
-      list_of(e.gyro), list_of(e.accel), list_of(e.g_sensitivity), list_of(e.gyro_warming), e.warm_up, list_of(e.accel_warming),
+      listed(e.gyro), listed(e.accel), listed(e.g_sensitivity), listed(e.gyro_warming), e.warm_up, listed(e.accel_warming),
       config.imu.accel_range, config.wear.vibration);
 }
 
@@ -33,7 +34,6 @@ std::string lidar_lines(const LidarErrors& e) {
 }
 
 std::string legs_lines(const SimulatorConfig& config, const Simulator& simulator) {
-  constexpr double degree = std::numbers::pi / 180;
   const WearModel& w = config.wear;
   std::string zeros;
   for (std::size_t i = 0; i < joint_names().size(); ++i)

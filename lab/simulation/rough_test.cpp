@@ -2,11 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <numbers>
 
 #include "lab/simulation/clutter.hpp"
 #include "lab/simulation/description.hpp"
 #include "lab/simulation/rough_record.hpp"
+#include "lab/simulation/units.hpp"
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo::lab {
@@ -18,8 +18,6 @@ using test::scenario;
 using test::small;
 using testing::HasSubstr;
 using testing::Not;
-
-constexpr double degree = std::numbers::pi / 180;
 
 std::vector<double> numbers_of(const SimulatorConfig& config, const std::string& name = "room") {
   Simulator simulator(scenario(name), config);

@@ -4,6 +4,8 @@
 #include <numbers>
 #include <utility>
 
+#include "lab/simulation/units.hpp"
+
 namespace kilvo::lab {
 namespace {
 
@@ -82,7 +84,6 @@ Gait lifting() { return {.period = 1.8, .double_support = 0.5, .lift = 0.1, .lea
 
 // As robots are after some time of use: leg lengths and zeros not as the URDF says, play and give, shocks, messages that get lost.
 WearModel well_used() {
-  constexpr double degree = std::numbers::pi / 180;
   return {.sole_motion = 0.01,
           .shock = 0.1,
           .impact = 8,

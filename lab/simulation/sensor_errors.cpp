@@ -5,12 +5,12 @@
 #include <numbers>
 
 #include "lab/simulation/random.hpp"
+#include "lab/simulation/units.hpp"
 
 namespace kilvo::lab {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr double degree = pi / 180;
+using std::numbers::pi;
 constexpr std::uint64_t material_stream = 61;
 
 // How much longer a beam's spot is on a grazed surface than on one that it meets upright: 0 to 1 at 75 degrees, constant from 80 on.

@@ -16,7 +16,7 @@ SimulatorConfig worn(SimulatorConfig config) {
   return config;
 }
 
-enum Stream : std::uint8_t { bias_stream = 1, offset_stream = 2, sensor_stream = 10 };
+enum SimulatorStream : std::uint8_t { bias_stream = 1, offset_stream = 2, sensor_stream = 10 };
 
 constexpr std::size_t index_of(Sensor sensor) { return static_cast<std::size_t>(sensor); }
 

@@ -8,7 +8,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double spacing = 0.1;  // s, of the control points of the pelvis
 namespace channel {
 enum : std::uint8_t { x, y, z, yaw, phase, sway, bob, roll, pitch, twist, lean };
@@ -25,8 +25,6 @@ double ring(double t) {
   const double since = t - ring_delay, grown = std::erfc(-since / (ring_onset * std::numbers::sqrt2)) / 2;
   return grown * std::exp(-ring_decay * since) * std::sin(ring_frequency * since) / (ring_frequency * ring_frequency);
 }
-
-constexpr std::size_t index_of(Side side) { return side == Side::left ? 0 : 1; }
 
 // Turns the foot by `angle` about its y axis through a point of its sole.
 SE3 pivot(double x, double z, double angle) {

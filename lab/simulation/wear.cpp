@@ -7,7 +7,7 @@
 namespace kilvo::lab {
 namespace {
 
-enum Stream : std::uint8_t { link_stream = 40, shock_stream, jitter_stream, imu_loss_stream, leg_loss_stream, tone_stream };
+enum WearStream : std::uint8_t { link_stream = 40, shock_stream, jitter_stream, imu_loss_stream, leg_loss_stream, tone_stream };
 
 // Crossing the play of a joint takes this long, s.
 constexpr double crossing = 0.005;

@@ -1,8 +1,8 @@
 #include "lab/simulation/wear.hpp"
 
 #include <gtest/gtest.h>
-#include <numbers>
 
+#include "lab/simulation/units.hpp"
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo::lab {
@@ -10,8 +10,6 @@ namespace {
 
 using test::all_of;
 using test::scenario;
-
-constexpr double degree = std::numbers::pi / 180;
 
 SimulatorConfig legs_of(const std::string& name, double duration) {
   SimulatorConfig config = robot_of(scenario(name));
