@@ -1,5 +1,6 @@
 #include "apps/cli/make_estimator.hpp"
 
+#include <algorithm>
 #include <fmt/core.h>
 #include <stdexcept>
 
@@ -18,6 +19,13 @@ Estimator make_estimator(const lab::Settings& settings, const std::vector<Sensor
     const std::string why = error.what();
     throw lab::ConfigError(why.starts_with("robot.urdf") ? fmt::format("{}: {}", settings.urdf_file, why) : why);
   }
+}
+
+void fit_to_machine(lab::Settings& settings, bool live, int threads) {
+  // On a robot the other cores are for others.
+  if (live && !settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
+  // Reading and the map keep about one core busy.
+  if (!settings.given.contains("estimator.threads")) settings.estimator.threads = live ? 1 : std::max(1, threads - 1);
 }
 
 }  // namespace kilvo::cli

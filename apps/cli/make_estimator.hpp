@@ -15,4 +15,7 @@ std::array<bool, sensor_count> as_flags(const std::vector<Sensor>& sensors);
 /// Throws lab::ConfigError when the settings, or what the URDF says, make no sense.
 Estimator make_estimator(const lab::Settings& settings, const std::vector<Sensor>& used);
 
+/// What is not given in `settings`, for so many threads; `live`: on a robot.
+void fit_to_machine(lab::Settings& settings, bool live, int threads);
+
 }  // namespace kilvo::cli

@@ -9,7 +9,7 @@
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/held_output.hpp"
 #include "apps/cli/interrupt.hpp"
-#include "apps/cli/left_out.hpp"
+#include "apps/cli/known_description.hpp"
 #include "apps/cli/make_estimator.hpp"
 #include "apps/cli/map_keeper.hpp"
 #include "apps/cli/output_folder.hpp"
@@ -45,18 +45,18 @@ void tell_start(const RunFacts& facts, const lab::RecordingSource& source, bool 
 /// Everything between the first message and the last file.
 class Run {
  public:
-  /// `known`: of a run before, which these findings spoilt; facts.sensors are those that are left, none when nothing can be estimated.
-  Run(const RunOptions& options, InterruptWatch& interrupt, const lab::Settings& settings, const SensorChoice& choice, RunFacts facts,
-      std::vector<lab::WrongDescription> known)
+  /// facts.sensors: those of `used` that are left, none when nothing can be estimated.
+  Run(const RunOptions& options, InterruptWatch& interrupt, const lab::Settings& settings, const std::vector<Sensor>& used, RunFacts facts,
+      const KnownDescription& known)
       : options_(options),
         interrupt_(interrupt),
-        wrong_(std::move(known)),
-        again_(!wrong_.empty()),
+        known_(known),
+        used_(used),
         settings_(settings),
         facts_(std::move(facts)),
-        source_({options.inputs.begin(), options.inputs.end()}, recording_options(options, settings_, choice.used)),
+        source_({options.inputs.begin(), options.inputs.end()}, recording_options(options, settings_, read())),
         failing_(source_, options.failures, source_.begin(), [this] { return source_.recorded(); }),
-        estimator_(make_estimator(settings_, choice.used)),
+        estimator_(make_estimator(settings_, read())),
         map_(settings_.mapping, options.threads > 1 || options.realtime),
         files_(options.out, settings_.estimator.smooth_time),
         log_(options.mcap ? std::make_unique<lab::RunLog>(options.out / "run.mcap",
@@ -70,12 +70,12 @@ class Run {
     if (!options.quiet) tell_start(facts_, source_, options.no_deskew);
   }
 
-  /// None: the description is wrong, as wrong() says, and the run has to begin anew without what that spoils.
+  /// None: the description is wrong, as wrong() says, and the run has to begin anew.
   std::optional<int> all() {
     const bool interrupted = options_.realtime ? replay_live() : !facts_.sensors.empty() && replay();
     progress_.finish();
-    if (!again_ && !spoilt_ && !interrupted) wrong_ = description_.finish();
-    if (!again_ && !options_.realtime && !first_spoiling(wrong_).empty()) return std::nullopt;
+    if (known_.is_judged() && !stopped_ && !interrupted) wrong_ = description_.finish();
+    if (!options_.realtime && std::ranges::any_of(wrong_, [this](const auto& wrong) { return known_.stops(wrong); })) return std::nullopt;
     files_.write_events(estimator_.take_events());
     if (!interrupted) settle_description();
     if (facts_.failure.empty()) facts_.failure = failure(interrupted);
@@ -96,33 +96,32 @@ class Run {
  private:
   // Said as soon as the evidence is in; the files get it at the end, where it does not depend on how fast it was judged.
   void hold_against_description(const Measurement& measurement) {
-    if (again_ || options_.trust_description) return;
+    if (!known_.is_judged() || options_.trust_description) return;
     description_.take(measurement);
     for (lab::WrongDescription& wrong : description_.news()) {
       progress_.finish();
       fmt::print(stderr, "kilvo: {}: after {:.1f} s of data: {}\n", wrong.spoils ? "error" : "warning", wrong.after, wrong.finding.text);
-      spoilt_ = spoilt_ || (wrong.spoils && !options_.realtime);
+      stopped_ = stopped_ || (known_.stops(wrong) && !options_.realtime);
       wrong_.push_back(std::move(wrong));
     }
   }
 
   // A run with a wrong description has failed, however good it looks.
   void settle_description() {
-    for (const auto& [finding, t, after, spoils] : wrong_) {
+    for (const lab::Change& c : known_.mended) facts_.warnings.push_back(fmt::format("begun anew with {}: {}", c.key, c.value));
+    wrong_.insert(wrong_.begin(), known_.wrong.begin(), known_.wrong.end());
+    for (const lab::WrongDescription& wrong : wrong_) {
+      const lab::Finding& finding = wrong.finding;
       facts_.warnings.push_back(fmt::format("{}; {}", finding.text, finding.remedy));
-      files_.write_description(t, finding.sensor, spoils, finding.size, facts_.warnings.back());
-      if (facts_.failure.empty() && spoils)
-        facts_.failure = fmt::format("the robot's description is wrong: {} (kilvo doctor shows the evidence){}", finding.text, remains());
+      files_.write_description(wrong.t, finding.sensor, wrong.spoils, finding.size, facts_.warnings.back());
+      if (facts_.failure.empty() && wrong.spoils)
+        facts_.failure = fmt::format("the robot's description is wrong: {} (kilvo doctor shows the evidence){}", finding.text,
+                                     consequence(known_, used_, facts_.sensors));
     }
   }
 
-  std::string remains() const {
-    if (!again_) return "";
-    if (facts_.sensors.empty()) return "; nothing is left to estimate with";
-    std::string names;
-    for (const Sensor sensor : facts_.sensors) names += (names.empty() ? "" : ", ") + std::string(name_of(sensor));
-    return "; the results are of " + names + " alone";
-  }
+  // Of a run without senses the messages are looked at alone.
+  const std::vector<Sensor>& read() const { return facts_.sensors.empty() ? used_ : facts_.sensors; }
 
   // True when the user stopped it.
   bool replay() {
@@ -133,14 +132,14 @@ class Run {
       require_legs(*measurement);
       skeleton_.add(*measurement);
       hold_against_description(*measurement);
-      if (spoilt_) break;
+      if (stopped_) break;
       keep(estimator_.push(*std::move(measurement)));
       progress_.update(input.progress(), [this] { return progress_note(); });
       interrupted = interrupt_.requested();
       if (interrupted) break;
     }
     input.stop();
-    if (spoilt_) return false;
+    if (stopped_) return false;
     keep(estimator_.finish());
     levelling_.finish();
     write_waiting();
@@ -243,8 +242,10 @@ class Run {
 
   const RunOptions& options_;
   InterruptWatch& interrupt_;
-  std::vector<lab::WrongDescription> wrong_;
-  bool again_, spoilt_ = false;  // this is the second run; the first one is over
+  const KnownDescription& known_;
+  const std::vector<Sensor>& used_;
+  std::vector<lab::WrongDescription> wrong_;  // found in this round
+  bool stopped_ = false;                      // by that
   lab::Settings settings_;
   RunFacts facts_;
   lab::RecordingSource source_;
@@ -272,29 +273,28 @@ int run_recording(const RunOptions& options) {
   claim_folder(options.out);
   remove_results(options.out);
   if (options.map) prepare_folder(std::filesystem::absolute(*options.map).parent_path());
-  SensorChoice choice = choose_sensors(options.sensors, settings, config.string(), options.inputs);
+  const SensorChoice choice = choose_sensors(options.sensors, settings, config.string(), options.inputs);
   lab::require_complete(settings, choice.used);
-  // On a robot the other cores are for others.
-  if (options.realtime && !settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
-  // Reading and the map keep about one core busy.
-  if (!settings.given.contains("estimator.threads")) settings.estimator.threads = options.realtime ? 1 : std::max(1, options.threads - 1);
   facts.input = joined(options.inputs);
   facts.config_file = config.string();
   facts.sensors = choice.used;
   facts.warnings = choice.warnings;
   InterruptWatch interrupt;  // before any thread, so that none of them takes the signal
-  std::vector<lab::WrongDescription> wrong;
-  {
-    Run run(options, interrupt, settings, choice, facts, {});
-    if (const std::optional<int> code = run.all()) return *code;
-    wrong = first_spoiling(run.wrong());
+  // No trajectory leaves that a wrong description has spoilt: a round that it stops is followed by another one.
+  for (KnownDescription known;;) {
+    if (known.round > 1) {
+      settings = mended(known, options, config);
+      facts.sensors = sound(choice.used, known);
+      remove_results(options.out);
+      if (!options.quiet) fmt::print(stderr, "kilvo: the run begins anew{}\n", consequence(known, choice.used, facts.sensors));
+    }
+    fit_to_machine(settings, options.realtime.has_value(), options.threads);
+    auto run = std::make_unique<Run>(options, interrupt, settings, choice.used, facts, known);
+    if (const std::optional<int> code = run->all()) return *code;
+    const std::vector<lab::WrongDescription> found = run->wrong();
+    run.reset();
+    known = next_round(std::move(known), found, options, config, choice.used);
   }
-  // No trajectory leaves that a wrong description has spoilt: what is left estimates anew, from the beginning.
-  facts.sensors = without_spoiled(choice.used, wrong);
-  remove_results(options.out);
-  if (!options.quiet) fmt::print(stderr, "kilvo: the run begins anew with what is left\n");
-  if (!facts.sensors.empty()) choice.used = facts.sensors;
-  return *Run(options, interrupt, settings, choice, facts, std::move(wrong)).all();
 }
 
 }  // namespace kilvo::cli

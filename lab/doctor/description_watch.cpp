@@ -30,7 +30,17 @@ bool spoils(const Finding& finding) {
   return finding.cause.ends_with("_clock") && std::abs(finding.size) > time;
 }
 
+bool is_mendable(const Finding& finding) {
+  constexpr double time = 0.01;  // s, that the estimator finds and corrects by itself
+  if (finding.changes.empty() || finding.cause.ends_with("_rate")) return false;
+  return !finding.cause.ends_with("_clock") || std::abs(finding.size) > time;
+}
+
 }  // namespace
+
+WrongDescription as_wrong(const Finding& finding, Time t, double after) {
+  return {finding, t, after, spoils(finding), is_mendable(finding)};
+}
 
 void DescriptionWatch::take(const Measurement& measurement) {
   const Sensor sensor = sensor_of(measurement);
@@ -89,7 +99,7 @@ void DescriptionWatch::collect() {
   over_ = verdict.known || windows_ >= most_windows;
   for (const Finding& finding : verdict.findings) {
     const auto same = [&finding](const WrongDescription& w) { return w.finding.cause == finding.cause; };
-    if (std::ranges::none_of(found_, same)) found_.push_back({finding, verdict.t, to_seconds(verdict.t - *origin_), spoils(finding)});
+    if (std::ranges::none_of(found_, same)) found_.push_back(as_wrong(finding, verdict.t, to_seconds(verdict.t - *origin_)));
   }
 }
 

@@ -14,10 +14,14 @@ namespace kilvo::lab {
 
 struct WrongDescription {
   Finding finding;
-  Time t{};             // what came until then shows it
-  double after = 0;     // s of data
-  bool spoils = false;  // results with such a description are worthless, and not only worse
+  Time t{};                  // what came until then shows it
+  double after = 0;          // s of data
+  bool spoils = false;       // results with such a description are worthless, and not only worse
+  bool is_mendable = false;  // by settings, and the estimator does not cope with it without them
 };
+
+/// What the finding means for a run.
+WrongDescription as_wrong(const Finding& finding, Time t, double after);
 
 class DescriptionWatch {
  public:

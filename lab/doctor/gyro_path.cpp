@@ -20,6 +20,7 @@ Eigen::Quaterniond exp_of(const Eigen::Vector3d& v) {
 GyroPath::GyroPath(const std::vector<InertialSample>& imu, const Eigen::Matrix3d& axes, const Eigen::Vector3d& bias) {
   t_.reserve(imu.size());
   R_.reserve(imu.size());
+  forces_.reserve(imu.size());
   Eigen::Quaterniond R = Eigen::Quaterniond::Identity();
   const InertialSample* before = nullptr;
   for (const InertialSample& s : imu) {
@@ -32,6 +33,7 @@ GyroPath::GyroPath(const std::vector<InertialSample>& imu, const Eigen::Matrix3d
     before = &s;
     t_.push_back(s.t);
     R_.push_back(R);
+    forces_.push_back(s.accel + (forces_.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : forces_.back()));
   }
 }
 
@@ -45,5 +47,14 @@ Eigen::Quaterniond GyroPath::at(double t) const {
 }
 
 Eigen::Vector3d GyroPath::rate(double a, double b) const { return log_of(between(a, b)) / (b - a); }
+
+Eigen::Vector3d GyroPath::force(double a, double b) const {
+  const auto before = [this](double t) {
+    return std::clamp<std::ptrdiff_t>(std::ranges::upper_bound(t_, t) - t_.begin() - 1, 0, std::ssize(t_) - 1);
+  };
+  const std::ptrdiff_t i = before(a), j = before(b);
+  const auto sum = [this](std::ptrdiff_t k) { return forces_[static_cast<std::size_t>(k)]; };
+  return j > i ? Eigen::Vector3d((sum(j) - sum(i)) / static_cast<double>(j - i)) : Eigen::Vector3d::Zero();
+}
 
 }  // namespace kilvo::lab

@@ -23,10 +23,13 @@ class GyroPath {
   Eigen::Quaterniond at(double t) const;
   /// rad/s, mean from a to b, in the IMU frame in the middle between (first order).
   Eigen::Vector3d rate(double a, double b) const;
+  /// Mean of what the accelerometer wrote from a to b, by the nearest samples.
+  Eigen::Vector3d force(double a, double b) const;
 
  private:
   std::vector<double> t_;
   std::vector<Eigen::Quaterniond> R_;
+  std::vector<Eigen::Vector3d> forces_;  // sum of those until each time
 };
 
 /// Rotation vector of a quaternion.

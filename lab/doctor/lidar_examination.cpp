@@ -13,7 +13,6 @@ constexpr double lidar_rotation_tolerance = 0.7;  // degrees
 constexpr double worth_a_note = 0.08;             // degrees
 constexpr double lidar_clock_tolerance = 0.0035;  // s
 constexpr double believable = 0.2;                // m/s, that the acceleration and the way may be apart by
-constexpr double very_sure = 7;                   // of a gyro whose own axes may be half a degree off
 
 double mean_thickness(const std::vector<SweepPose>& way) {
   double sum = 0, n = 0;
@@ -163,7 +162,8 @@ void Examination::examine_lidar_rotation() {
   if (way_.empty()) way_ = rigid_;
   const SO3 described = robot_.lidar.T_imu_lidar.R;
   const SO3 start = SO3::nearest(lidar_.error * described.matrix());
-  const MountFit fit = fit_mount(turns, gyro(), start, lidar_.offset);
+  const GyroPath path = gyro();
+  const MountFit fit = refine_mount(turns, path, fit_mount(turns, path, start, lidar_.offset));
   if (!fit.fit.good) {
     check(Sensor::lidar, "rotation of the mount", Check::Verdict::unknown, "too few sweeps could be registered");
     return;
@@ -178,7 +178,7 @@ void Examination::examine_lidar_rotation() {
   const Eigen::Vector3d sigma = fit.rotation_sigma();
   const double uncertain = degrees(sigma.norm());
   const std::string detail = fmt::format("{:.2f} degrees from the description, standard deviation {:.2f}", angle, uncertain);
-  if (angle < std::max(lidar_rotation_tolerance, very_sure * uncertain)) {
+  if (angle < std::max(lidar_rotation_tolerance, sure * uncertain)) {
     const bool note = angle > worth_a_note && angle > 3 * uncertain;
     check(Sensor::lidar, "rotation of the mount",
           uncertain > 5 ? Check::Verdict::unknown
@@ -232,8 +232,10 @@ void Examination::examine_lidar_rotation() {
 }
 
 void Examination::examine_lidar_clock() {
+  const std::vector<Turn> turns = turns_of(way_);
+  const GyroPath path = gyro();
   const MountFit fit =
-      fit_mount(turns_of(way_), gyro(), SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix()), lidar_.offset);
+      refine_mount(turns, path, fit_mount(turns, path, SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix()), lidar_.offset));
   if (!fit.fit.good) return;
   const double sigma = fit.offset_sigma();
   constexpr double method = 0.00015;  // s

@@ -21,7 +21,7 @@ void Examination::examine_lidar_position() {
   }
   const SO3 R_IL = SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix());
   const TranslationRows rows(way_, recorded_.imu, gyro(), R_IL, lidar_offset_);
-  translation_ = rows.fit(accel_axes_);
+  translation_ = rows.refine(accel_axes_);
   if (!translation_) {
     check(Sensor::lidar, "position of the mount", Check::Verdict::unknown, "too few sweeps in a row that know their way");
     return;

@@ -13,13 +13,13 @@ namespace kilvo::lab {
 namespace {
 
 using Matrix39 = Eigen::Matrix<double, 3, 9>;
-using Matrix9 = Eigen::Matrix<double, 9, 9>;
 using Vector9 = Eigen::Matrix<double, 9, 1>;
 
-constexpr double accel_bias_prior = 0.15;  // m/s^2
-constexpr double position_prior = 1;       // m
-constexpr double weak = 0.02;              // share of the sweep's information; below it the LiDAR does not know its way
-constexpr std::size_t fewest_rows = 40;    // rows
+constexpr double accel_bias_prior = 0.15;   // m/s^2
+constexpr double position_prior = 1;        // m
+constexpr double accel_axes_prior = 0.005;  // of an element: scale and misalignment of an IMU of a robot
+constexpr double weak = 0.02;               // share of the sweep's information; below it the LiDAR does not know its way
+constexpr std::size_t fewest_rows = 40;     // rows
 
 // Velocity and place that a constant force in the IMU frame (one column for each element of the axes) gives from a to b, in the frame of
 // the IMU at a. Each sample holds until the middle between its neighbours.
@@ -60,8 +60,9 @@ Matrix39 mean_shift(const std::vector<InertialSample>& imu, const GyroPath& gyro
 }
 
 struct Block {
-  Matrix9 H = Matrix9::Zero();
-  Vector9 g = Vector9::Zero();
+  explicit Block(Eigen::Index n) : H(Eigen::MatrixXd::Zero(n, n)), g(Eigen::VectorXd::Zero(n)) {}
+  Eigen::MatrixXd H;
+  Eigen::VectorXd g;
 };
 
 }  // namespace
@@ -71,6 +72,7 @@ double TranslationFit::sigma_r(int i) const { return std::sqrt(std::max(0.0, cov
 TranslationRows::TranslationRows(const std::vector<SweepPose>& poses, const std::vector<InertialSample>& imu, const GyroPath& gyro,
                                  const SO3& R_IL, double offset) {
   const auto usable = [&](const SweepPose& p) { return p.good && p.weakest > weak; };
+  std::size_t last = 0;
   for (std::size_t k = 1; k + 1 < poses.size(); ++k) {
     const SweepPose &a = poses[k - 1], &b = poses[k], &c = poses[k + 1];
     if (!usable(a) || !usable(b) || !usable(c)) continue;
@@ -81,6 +83,8 @@ TranslationRows::TranslationRows(const std::vector<SweepPose>& poses, const std:
     const Integral I = integrate(imu, gyro, a.t + offset, b.t + offset), J = integrate(imu, gyro, b.t + offset, c.t + offset);
     Row row;
     row.t = b.t;
+    row.follows = !rows_.empty() && last + 1 == k;
+    last = k;
     row.dt = 0.5 * (before + after);
     row.y = (c.T_WL.p - b.T_WL.p) / after - (b.T_WL.p - a.T_WL.p) / before;
     row.H_r = (R_c.matrix() - R_b.matrix()) / after - (R_b.matrix() - R_a.matrix()) / before;
@@ -94,49 +98,99 @@ TranslationRows::TranslationRows(const std::vector<SweepPose>& poses, const std:
   }
 }
 
-std::optional<TranslationFit> TranslationRows::fit(const Eigen::Matrix3d& axes) const {
-  if (rows_.size() < fewest_rows) return std::nullopt;
+// One line for each component of a row, over the place, gravity, the accelerometer's bias and, where they are free, its axes.
+struct TranslationRows::Equations {
+  static constexpr int most = 18;
+  std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most>> J;
+  std::vector<Eigen::Vector3d> y;
+};
+
+TranslationRows::Equations TranslationRows::equations(const Eigen::Matrix3d& axes, bool free_axes) const {
   Vector9 elements;
   for (int i = 0; i < 3; ++i) elements.segment<3>(3 * i) = axes.row(i).transpose();
-  TranslationFit out;
-  out.rows = rows_.size();
-  Vector9 x = Vector9::Zero();
-  double scale = 0.3;
-  Vector9 prior = Vector9::Zero();
+  Equations out;
+  for (const Row& row : rows_) {
+    auto& J = out.J.emplace_back(3, free_axes ? 18 : 9);
+    J.leftCols<9>() << row.H_r, row.dt * Eigen::Matrix3d::Identity(), row.H_ba;
+    if (free_axes) J.rightCols<9>() = row.force;
+    out.y.emplace_back(row.y - row.force * elements);
+  }
+  return out;
+}
+
+// A place that is tracked with this gain of a Kalman filter at rest, and the gain of its velocity that goes with it: a second difference is
+// a sum of three prediction errors, of which two are known. P. R. Kalata, "The tracking index", 1984.
+TranslationRows::Equations TranslationRows::whitened(const Equations& of, double gain) const {
+  const double of_velocity = 2 * (2 - gain) - 4 * std::sqrt(1 - gain), first = gain + of_velocity - 2, second = 1 - gain;
+  Equations out = of;
+  for (std::size_t i = 1; i < rows_.size(); ++i) {
+    if (!rows_[i].follows) continue;
+    out.J[i] -= first * out.J[i - 1];
+    out.y[i] -= first * out.y[i - 1];
+    if (i < 2 || !rows_[i - 1].follows) continue;
+    out.J[i] -= second * out.J[i - 2];
+    out.y[i] -= second * out.y[i - 2];
+  }
+  return out;
+}
+
+std::optional<TranslationRows::Solution> TranslationRows::solve(const Equations& of) const {
+  const Eigen::Index n = of.J.front().cols();
+  Eigen::VectorXd prior = Eigen::VectorXd::Zero(n);
   prior.head<3>().setConstant(1 / (position_prior * position_prior));
-  prior.tail<3>().setConstant(1 / (accel_bias_prior * accel_bias_prior));
+  prior.segment<3>(6).setConstant(1 / (accel_bias_prior * accel_bias_prior));
+  if (n > 9) prior.tail<9>().setConstant(1 / (accel_axes_prior * accel_axes_prior));
+  Solution out;
+  out.x = Eigen::VectorXd::Zero(n);
+  out.scale = 0.3;
   for (int k = 0; k < 8; ++k) {
-    const Matrix9 H_prior = scale * scale * Matrix9(prior.asDiagonal());
-    std::vector<Block> blocks(1);
-    Vector9 g = Vector9::Zero();
+    const double s2 = out.scale * out.scale;
+    const Eigen::MatrixXd H_prior = s2 * Eigen::MatrixXd(prior.asDiagonal());
+    std::vector<Block> blocks(1, Block(n));
+    Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
     std::vector<double> lengths;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const Row& row = rows_[i];
-      Matrix39 J;
-      J << row.H_r, row.dt * Eigen::Matrix3d::Identity(), row.H_ba;
-      const Eigen::Vector3d y = row.y - row.force * elements, e = y - J * x;
-      const double square = e.squaredNorm() / 3;
+      const Eigen::Vector3d e = of.y[i] - of.J[i] * out.x;
       lengths.push_back(e.squaredNorm());
-      const double weight = 1 / (1 + square / (4 * scale * scale));
-      if (i > 0 && static_cast<int>(rows_[i - 1].t / block_seconds) != static_cast<int>(row.t / block_seconds)) blocks.emplace_back();
-      blocks.back().H += weight * J.transpose() * J;
-      blocks.back().g += weight * J.transpose() * e;
-      g += weight * J.transpose() * y;
+      const double weight = 1 / (1 + e.squaredNorm() / (12 * s2));
+      if (i > 0 && static_cast<int>(rows_[i - 1].t / block_seconds) != static_cast<int>(rows_[i].t / block_seconds)) blocks.emplace_back(n);
+      blocks.back().H += weight * of.J[i].transpose() * of.J[i];
+      blocks.back().g += weight * of.J[i].transpose() * e;
+      g += weight * of.J[i].transpose() * of.y[i];
     }
-    Matrix9 H = H_prior;
+    Eigen::MatrixXd H = H_prior;
     for (const Block& b : blocks) H += b.H;
-    const Matrix9 inverse = H.ldlt().solve(Matrix9::Identity());
-    out.cov = scale * scale * inverse * H_prior * inverse + jackknife(blocks, H);
-    x = inverse * g;
+    const Eigen::MatrixXd inverse = H.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+    if (k == 7) out.cov = s2 * inverse * H_prior * inverse + jackknife(blocks, H);
+    out.x = inverse * g;
     const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
     std::ranges::nth_element(lengths, middle);
-    scale = std::sqrt(*middle / 2.366) + 1e-6;
+    out.scale = std::sqrt(*middle / 2.366) + 1e-6;
   }
-  if (!x.allFinite()) return std::nullopt;
-  out.r = x.head<3>();
-  out.g_W = x.segment<3>(3);
-  out.ba = x.tail<3>();
-  out.rms = scale;
+  return out.x.allFinite() ? std::optional(out) : std::nullopt;
+}
+
+std::optional<TranslationFit> TranslationRows::fit(const Eigen::Matrix3d& axes) const {
+  if (rows_.size() < fewest_rows) return std::nullopt;
+  const auto found = solve(equations(axes, false));
+  if (!found) return std::nullopt;
+  return TranslationFit{found->x.head<3>(), found->x.segment<3>(3), found->x.tail<3>(), found->cov, found->scale, rows_.size()};
+}
+
+std::optional<TranslationFit> TranslationRows::refine(const Eigen::Matrix3d& axes) const {
+  std::optional<TranslationFit> out = fit(axes);
+  if (!out) return std::nullopt;
+  const Equations with_axes = equations(axes, true);
+  std::optional<Solution> best;
+  for (const double gain : {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9}) {
+    std::optional<Solution> found = solve(whitened(with_axes, gain));
+    if (found && (!best || found->scale < best->scale)) best = std::move(found);
+  }
+  if (!best) return out;
+  out->r = best->x.head<3>();
+  out->cov.topRows<3>().setZero();
+  out->cov.leftCols<3>().setZero();
+  out->cov.topLeftCorner<3, 3>() = best->cov.topLeftCorner<3, 3>();
   return out;
 }
 

@@ -28,14 +28,27 @@ class TranslationRows {
   std::size_t size() const { return rows_.size(); }
   /// `axes`: takes what the accelerometer wrote to m/s^2 in the IMU frame. None with too few rows.
   std::optional<TranslationFit> fit(const Eigen::Matrix3d& axes) const;
+  /// The same with a place of the LiDAR that is some times as precise: an accelerometer's axes may be a little off, and each row's noise is
+  /// predicted from those before (L. Ljung, "System identification", 1999, prediction errors): the noise of a place is in three rows.
+  std::optional<TranslationFit> refine(const Eigen::Matrix3d& axes) const;
 
  private:
   struct Row {
     double t, dt;
+    bool follows;  // the row before is of the sweep before
     Eigen::Matrix3d H_r, H_ba;
     Eigen::Vector3d y;
     Eigen::Matrix<double, 3, 9> force;  // of each element of the axes, row by row
   };
+  struct Equations;
+  Equations equations(const Eigen::Matrix3d& axes, bool free_axes) const;
+  Equations whitened(const Equations& of, double gain) const;
+  struct Solution {
+    Eigen::VectorXd x;
+    Eigen::MatrixXd cov;
+    double scale = 0;  // robust standard deviation of a row
+  };
+  std::optional<Solution> solve(const Equations& of) const;
   std::vector<Row> rows_;
 };
 

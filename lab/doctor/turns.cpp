@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "kilvo/math/decompositions.hpp"
 
@@ -11,7 +12,9 @@ namespace {
 constexpr std::size_t fewest_intervals = 30;  // intervals
 constexpr double least_turning = 0.03;        // rad/s rms, below which nothing is compared
 constexpr double gyro_bias_prior = 0.02;      // rad/s
-constexpr double resolution = 0.005;          // s, of the search for the offset
+// Of the gyro of a robot: rad/s per m/s^2 and, of scales and skew, without a unit.
+constexpr double sensitivity_prior = 1e-3, gyro_axes_prior = 0.005;
+constexpr double resolution = 0.005;  // s, of the search for the offset
 constexpr std::size_t most_offsets = 6;
 
 struct Pair {
@@ -147,35 +150,113 @@ std::vector<double> likely_offsets(const std::vector<Turn>& turns, const GyroPat
   return out;
 }
 
-MountFit fit_mount(const std::vector<Turn>& turns, const GyroPath& gyro, const SO3& R, double offset, double rotation_prior) {
-  MountFit out;
-  // The same intervals for every iterate: those that the gyro covers with some slack.
-  std::vector<const Turn*> inside;
-  constexpr double slack = 0.05;
-  for (const Turn& turn : turns) {
-    if (gyro.covers(turn.a + offset - slack, turn.b + offset + slack)) inside.push_back(&turn);
-  }
-  const auto residuals = [&](const Eigen::VectorXd& x, Residuals& r) {
-    const SO3 mount = R * SO3::Exp(x.head<3>());
-    const double tau = offset + std::clamp(x[3], -slack, slack);
-    for (const Turn* turn : inside) {
-      const double dt = turn->b - turn->a;
-      const Eigen::Vector3d rate = log_of(gyro.between(turn->a + tau, turn->b + tau)) / dt - x.tail<3>();
-      const Eigen::Vector3d expected = mount.inverse() * rate;
-      const Eigen::Vector3d e = nearest(*turn, dt * expected) / dt - expected;
-      r.r.insert(r.r.end(), {e.x(), e.y(), e.z()});
-      r.block.push_back(static_cast<int>(turn->a / block_seconds));
+namespace {
+
+// What the gyro says of the turns, and how they differ from it under a mount.
+class MountResiduals {
+ public:
+  static constexpr double slack = 0.05;  // s
+
+  MountResiduals(const std::vector<Turn>& turns, const GyroPath& gyro, const SO3& R, double offset) : gyro_(gyro), R_(R), offset_(offset) {
+    // The same intervals for every iterate: those that the gyro covers with some slack.
+    for (const Turn& turn : turns) {
+      if (gyro.covers(turn.a + offset - slack, turn.b + offset + slack)) inside_.push_back(&turn);
     }
-  };
-  Eigen::VectorXd start = Eigen::VectorXd::Zero(7), prior(7), step(7);
-  prior << rotation_prior, rotation_prior, rotation_prior, INFINITY, gyro_bias_prior, gyro_bias_prior, gyro_bias_prior;
-  step << 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3;
-  out.fit = robust_fit(residuals, start, prior, step);
-  out.R = R * SO3::Exp(out.fit.x.head<3>());
-  out.offset = offset + out.fit.x[3];
-  out.bias = out.fit.x.tail<3>();
-  if (out.fit.good) out.explained = explained_by(turns, gyro, out.offset, out.R.matrix());
+  }
+
+  /// Share of a turn's noise that the next one has with the opposite sign.
+  void predict(double share) { share_ = share; }
+
+  /// x: rotation (3), offset (1), bias (3) and, where it is longer, sensitivity to acceleration (9), scales and skew (6).
+  void operator()(const Eigen::VectorXd& x, Residuals& out) {
+    const bool flawed = x.size() > plain;
+    sense(offset_ + std::clamp(x[3], -slack, slack), flawed);
+    const SO3 back = (R_ * SO3::Exp(x.head<3>())).inverse();
+    Eigen::Matrix3d S = Eigen::Matrix3d::Zero(), M = S;
+    if (flawed) {
+      S = Eigen::Map<const Eigen::Matrix3d>(x.data() + plain);
+      const double* m = x.data() + plain + 9;
+      M << m[0], m[1], m[2], m[1], m[3], m[4], m[2], m[4], m[5];
+    }
+    Eigen::Vector3d last = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < inside_.size(); ++i) {
+      const Turn& turn = *inside_[i];
+      const double dt = turn.b - turn.a;
+      Eigen::Vector3d rate = rates_[i] - x.segment<3>(4);
+      if (flawed) rate -= S * forces_[i] + M * rate;
+      const Eigen::Vector3d expected = back * rate;
+      Eigen::Vector3d e = nearest(turn, dt * expected) / dt - expected;
+      if (share_ > 0 && i > 0 && turn.a == inside_[i - 1]->b) e += share_ * (SO3::Exp(turn.theta[0]).inverse() * last);
+      last = e;
+      out.r.insert(out.r.end(), {e.x(), e.y(), e.z()});
+      out.block.push_back(static_cast<int>(turn.a / block_seconds));
+    }
+  }
+
+  static constexpr Eigen::Index plain = 7, all = 22;
+
+ private:
+  // Once for all parameters but the offset.
+  void sense(double offset, bool with_forces) {
+    if (sensed_ == offset && (!with_forces || !forces_.empty())) return;
+    sensed_ = offset;
+    rates_.clear(), forces_.clear();
+    for (const Turn* turn : inside_) {
+      rates_.emplace_back(gyro_.rate(turn->a + offset, turn->b + offset));
+      if (with_forces) forces_.push_back(gyro_.force(turn->a + offset, turn->b + offset));
+    }
+  }
+
+  const GyroPath& gyro_;
+  SO3 R_;
+  double offset_, share_ = 0;
+  std::vector<const Turn*> inside_;
+  std::optional<double> sensed_;
+  std::vector<Eigen::Vector3d> rates_, forces_;
+};
+
+MountFit mount_of(const Fit& fit, const std::vector<Turn>& turns, const GyroPath& gyro, const SO3& R, double offset) {
+  MountFit out;
+  out.fit = fit;
+  out.R = R * SO3::Exp(fit.x.head<3>());
+  out.offset = offset + fit.x[3];
+  out.bias = fit.x.segment<3>(4);
+  if (fit.good) out.explained = explained_by(turns, gyro, out.offset, out.R.matrix());
   return out;
+}
+
+}  // namespace
+
+MountFit fit_mount(const std::vector<Turn>& turns, const GyroPath& gyro, const SO3& R, double offset, double rotation_prior) {
+  MountResiduals residuals(turns, gyro, R, offset);
+  constexpr auto n = MountResiduals::plain;
+  Eigen::VectorXd prior(n);
+  prior << rotation_prior, rotation_prior, rotation_prior, INFINITY, gyro_bias_prior, gyro_bias_prior, gyro_bias_prior;
+  const Fit fit = robust_fit(std::ref(residuals), Eigen::VectorXd::Zero(n), prior, Eigen::VectorXd::Constant(n, 1e-3));
+  return mount_of(fit, turns, gyro, R, offset);
+}
+
+MountFit refine_mount(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& start) {
+  if (!start.fit.good) return start;
+  MountResiduals residuals(turns, gyro, start.R, start.offset);
+  constexpr auto n = MountResiduals::all;
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(n), prior(n);
+  x.segment<3>(4) = start.bias;
+  prior.head<4>().setConstant(INFINITY);
+  prior.segment<3>(4).setConstant(gyro_bias_prior);
+  prior.segment<9>(MountResiduals::plain).setConstant(sensitivity_prior);
+  prior.tail<6>().setConstant(gyro_axes_prior);
+  double least = INFINITY, share = 0;
+  for (const double candidate : {0.0, 0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9}) {
+    Residuals r;
+    residuals.predict(candidate);
+    residuals(x, r);
+    const double scale = scale_of(r);
+    if (scale < least) least = scale, share = candidate;
+  }
+  residuals.predict(share);
+  const Fit fit = robust_fit(std::ref(residuals), x, prior, Eigen::VectorXd::Constant(n, 1e-3));
+  return fit.good ? mount_of(fit, turns, gyro, start.R, start.offset) : start;
 }
 
 std::vector<Turn> best_half(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& fit) {

@@ -38,7 +38,7 @@ double explained_by(const std::vector<Turn>& turns, const GyroPath& gyro, double
 std::vector<double> likely_offsets(const std::vector<Turn>& turns, const GyroPath& gyro, double reach = 1.3);
 
 struct MountFit {
-  Fit fit;                                         // rotation of the mount (3), offset (1), gyro bias (3)
+  Fit fit;                                         // rotation of the mount (3), offset (1), gyro bias (3), and more
   SO3 R;                                           // takes the sensor's frame to the IMU's
   double offset = 0;                               // s: the sensor's stamps plus this are on the IMU's clock
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();  // rad/s
@@ -49,6 +49,11 @@ struct MountFit {
 
 /// Refines both from a start within some degrees and 20 ms or so.
 MountFit fit_mount(const std::vector<Turn>& turns, const GyroPath& gyro, const SO3& R, double offset, double rotation_prior = INFINITY);
+
+/// The same, some times as precise, of a sensor whose turns follow each other: each one's noise is predicted from those before, as what is
+/// off at the end of one is off at the beginning of the next; and what is wrong with the gyro (sensitivity to acceleration, scales and
+/// skew of its axes) is a part of the search, so that the mount is not taken for it. `start`: see fit_mount().
+MountFit refine_mount(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& start);
 
 /// The half of the intervals that a fit explains best: where a foot that is reported to stand does not roll.
 std::vector<Turn> best_half(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& fit);

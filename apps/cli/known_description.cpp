@@ -1,0 +1,122 @@
+#include "apps/cli/known_description.hpp"
+
+#include <algorithm>
+#include <fmt/ranges.h>
+#include <string_view>
+
+#include "apps/cli/recording_options.hpp"
+#include "lab/doctor/examination.hpp"
+#include "lab/simulation/failures.hpp"
+
+namespace kilvo::cli {
+namespace {
+
+using lab::WrongDescription;
+
+// s of data after those that showed a fault, by which its size is measured.
+constexpr double measured_for = 20;
+
+Sensor spoiled_by(const lab::Finding& finding) {
+  const std::string_view cause = finding.cause;
+  return cause.starts_with("imu_mount") || cause == "imu_link" ? Sensor::legs : finding.sensor;
+}
+
+bool has(const std::vector<Sensor>& sensors, Sensor sensor) { return std::ranges::find(sensors, sensor) != sensors.end(); }
+
+// Those of the judgement that stopped the run: which others came until it stopped depends on how fast it was judged.
+std::vector<WrongDescription> that_stopped(const KnownDescription& known, const std::vector<WrongDescription>& found) {
+  const auto first = std::ranges::find_if(found, [&](const WrongDescription& w) { return known.stops(w); });
+  std::vector<WrongDescription> out;
+  for (const WrongDescription& w : found) {
+    if (first != found.end() && w.t <= first->t) out.push_back(w);
+  }
+  return out;
+}
+
+struct Measured {
+  std::vector<lab::Finding> findings;
+  std::vector<lab::Refinement> refinements;
+};
+
+// The recording until some time after `first`, held against these settings.
+Measured measured(const WrongDescription& first, const RunOptions& options, const lab::Settings& settings, std::vector<Sensor> used) {
+  std::erase(used, Sensor::camera);
+  const lab::RecordingOptions wanted = recording_options(options, settings, used);
+  lab::RecordingSource source({options.inputs.begin(), options.inputs.end()}, wanted);
+  lab::FailingSource failing(source, options.failures, source.begin(), [&source] { return source.recorded(); });
+  lab::Recorder recorder(wanted.leg_clock.has_value());
+  while (const auto measurement = failing.next()) {
+    if (to_seconds(stamp_of(*measurement) - first.t) > measured_for) break;
+    recorder.push(*measurement);
+  }
+  const lab::Recorded recorded = recorder.finish();
+  lab::Examination examination(recorded, settings.robot);
+  std::vector<lab::Finding> findings = examination.run().findings;
+  return {std::move(findings), examination.refinements()};
+}
+
+void change(std::vector<lab::Change>& settings, const std::vector<lab::Change>& changes) {
+  for (const lab::Change& c : changes) {
+    std::erase_if(settings, [&c](const lab::Change& before) { return before.key == c.key; });
+    settings.push_back(c);
+  }
+}
+
+}  // namespace
+
+KnownDescription next_round(KnownDescription known, const std::vector<WrongDescription>& found, const RunOptions& options,
+                            const std::filesystem::path& config, const std::vector<Sensor>& used) {
+  std::vector<WrongDescription> wrong = that_stopped(known, found);
+  if (known.round == 1) {
+    const WrongDescription first = wrong.front();
+    // The same on more data, which measure what is wrong more precisely; and what is still off once that is mended.
+    std::vector<WrongDescription> again;
+    for (const lab::Finding& f : measured(first, options, mended(known, options, config), used).findings)
+      again.push_back(lab::as_wrong(f, first.t, first.after));
+    if (std::ranges::any_of(again, [&](const WrongDescription& w) { return known.stops(w); })) wrong = again;
+    for (const WrongDescription& w : wrong) {
+      if (known.stops(w)) change(known.mended, w.finding.changes);
+    }
+    if (!known.mended.empty()) {
+      for (const lab::Refinement& r : measured(first, options, mended(known, options, config), used).refinements) {
+        if (r.significant) change(known.mended, r.changes);
+      }
+    }
+  } else {
+    // What is still wrong was not mended by that.
+    for (WrongDescription& w : wrong) w.is_mendable = false;
+  }
+  known.wrong.insert(known.wrong.end(), wrong.begin(), wrong.end());
+  ++known.round;
+  return known;
+}
+
+lab::Settings mended(const KnownDescription& known, const RunOptions& options, const std::filesystem::path& config) {
+  std::vector<std::string> overrides = options.overrides;
+  for (const lab::Change& change : known.mended) overrides.push_back(change.key + "=" + change.value);
+  return lab::load_settings(config, overrides);
+}
+
+std::vector<Sensor> sound(const std::vector<Sensor>& used, const KnownDescription& known) {
+  std::vector<Sensor> out = used;
+  for (const WrongDescription& w : known.wrong) {
+    if (w.spoils && !w.is_mendable) std::erase(out, spoiled_by(w.finding));
+  }
+  if (!has(out, Sensor::lidar)) std::erase(out, Sensor::camera);
+  if (!has(out, Sensor::imu) || !(has(out, Sensor::legs) || has(out, Sensor::lidar))) out.clear();
+  return out;
+}
+
+std::string consequence(const KnownDescription& known, const std::vector<Sensor>& used, const std::vector<Sensor>& left) {
+  if (known.round == 1) return "";
+  if (left.empty()) return "; nothing is left to estimate with";
+  std::vector<std::string_view> keys, names;
+  for (const lab::Change& change : known.mended) keys.push_back(change.key);
+  for (const Sensor sensor : left) names.push_back(name_of(sensor));
+  std::string out = "; the results are";
+  if (!keys.empty()) out += fmt::format(" with {} mended", fmt::join(keys, ", "));
+  if (left != used) out += fmt::format("{} of {} alone", keys.empty() ? "" : ",", fmt::join(names, ", "));
+  return out;
+}
+
+}  // namespace kilvo::cli

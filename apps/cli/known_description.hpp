@@ -1,0 +1,38 @@
+// What a run does about a description that the data contradict: it begins anew with the settings that mend it, and without the senses
+// that nothing mends.
+#pragma once
+
+#include <vector>
+
+#include "apps/cli/run_recording.hpp"
+#include "lab/doctor/description_watch.hpp"
+#include "lab/settings/settings.hpp"
+
+namespace kilvo::cli {
+
+/// Of the rounds of a run before this one.
+struct KnownDescription {
+  std::vector<lab::WrongDescription> wrong;
+  std::vector<lab::Change> mended;  // settings that this round has instead of those of the user
+  int round = 1;
+  /// The data may still stop the run: as described, and as mended.
+  bool is_judged() const { return round == 1 || (round == 2 && !mended.empty()); }
+  /// A run with such a description is not to go on.
+  bool stops(const lab::WrongDescription& found) const { return found.spoils || (round == 1 && found.is_mendable); }
+};
+
+/// The next round, after one that `found` stopped. `used`: in the first one.
+KnownDescription next_round(KnownDescription known, const std::vector<lab::WrongDescription>& found, const RunOptions& options,
+                            const std::filesystem::path& config, const std::vector<Sensor>& used);
+
+/// The settings of this round.
+lab::Settings mended(const KnownDescription& known, const RunOptions& options, const std::filesystem::path& config);
+
+/// `used` without the senses that are described wrongly and not mended. A mount of the IMU on the robot concerns the legs alone; images
+/// need the LiDAR's map. Empty: nothing is left to estimate with.
+std::vector<Sensor> sound(const std::vector<Sensor>& used, const KnownDescription& known);
+
+/// "; the results are with lidar.T_imu_lidar.R mended, of imu, legs alone"
+std::string consequence(const KnownDescription& known, const std::vector<Sensor>& used, const std::vector<Sensor>& left);
+
+}  // namespace kilvo::cli
