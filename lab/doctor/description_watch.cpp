@@ -65,7 +65,8 @@ void DescriptionWatch::begin(Time t) {
   begin_ = last_ = t;
   if (!origin_) origin_ = t;
   recorder_ = Recorder(leg_clock_is_found_);
-  due_ = 0;
+  // What a window in which the robot moved has left open needs all of another one.
+  due_ = windows_ == 0 ? 0 : dues.size() - 1;
   turned_ = 0;
   last_imu_.reset();
 }
@@ -79,10 +80,12 @@ void DescriptionWatch::judge(Time t) {
   collect();
   if (over_) return;
   if (first_ || moved()) {
-    const auto work = [robot = robot_, recorder = recorder_, t]() mutable {
+    const auto work = [robot = robot_, recorder = recorder_, t, good = point_times_are_good_]() mutable {
       const Recorded recorded = recorder.finish();
-      const Diagnosis diagnosis = Examination(recorded, robot).run();
-      return Verdict{diagnosis.findings, diagnosis.settled, t};
+      const Diagnosis diagnosis = Examination(recorded, robot, good).run();
+      const auto times = std::ranges::find(diagnosis.checks, "point times", &Check::what);
+      return Verdict{diagnosis.findings, diagnosis.settled,
+                     good || (times != diagnosis.checks.end() && times->verdict == Check::Verdict::good), t};
     };
     future_ = std::async(judging_ == Judging::here ? std::launch::deferred : std::launch::async, work);
     if (judging_ == Judging::here) collect();
@@ -97,6 +100,7 @@ void DescriptionWatch::collect() {
   if (!future_.valid()) return;
   const Verdict verdict = future_.get();
   over_ = verdict.known || windows_ >= most_windows;
+  point_times_are_good_ = verdict.point_times_are_good;
   for (const Finding& finding : verdict.findings) {
     const auto same = [&finding](const WrongDescription& w) { return w.finding.cause == finding.cause; };
     if (std::ranges::none_of(found_, same)) found_.push_back(as_wrong(finding, verdict.t, to_seconds(verdict.t - *origin_)));

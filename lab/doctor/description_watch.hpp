@@ -42,6 +42,7 @@ class DescriptionWatch {
   struct Verdict {
     std::vector<Finding> findings;
     bool known = false;  // nothing that more data could show was left open
+    bool point_times_are_good = false;
     Time t{};
   };
   void begin(Time t);
@@ -59,6 +60,7 @@ class DescriptionWatch {
   bool over_ = false;    // all is judged
   bool first_ = true;    // window: judged even when the robot stands, for units and rates
   int windows_ = 0;      // in which the robot moved
+  bool point_times_are_good_ = false;
   double turned_ = 0;    // rad, by the gyro in this window
   std::optional<Time> last_imu_;
   std::future<Verdict> future_;

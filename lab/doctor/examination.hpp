@@ -37,7 +37,9 @@ struct SenseAgreement {
 
 class Examination {
  public:
-  Examination(const Recorded& recorded, const Robot& robot) : recorded_(recorded), robot_(robot), original_(robot) {}
+  /// `point_times_are_good`: which takes as long to see as most else; seen before.
+  Examination(const Recorded& recorded, const Robot& robot, bool point_times_are_good = false)
+      : recorded_(recorded), robot_(robot), original_(robot), point_times_are_good_(point_times_are_good) {}
 
   /// All checks, in their order.
   Diagnosis run();
@@ -62,6 +64,7 @@ class Examination {
   // lidar_examination.cpp
   void examine_lidar();
   void examine_point_times();
+  bool point_times_run_backwards(Deskew deskew);
   void examine_lidar_rotation();
   void examine_lidar_clock();
   void examine_lidar_position();
@@ -130,7 +133,8 @@ class Examination {
   std::vector<Turn> lidar_turns_, leg_turns_;
   SenseAgreement lidar_, legs_;
   std::optional<LegHypothesis> leg_mend_;
-  std::optional<SO3> leg_start_;              // mount of the IMU on its link, far from the described one, from which that is looked for
+  std::optional<SO3> leg_start_;  // mount of the IMU on its link, far from the described one, from which that is looked for
+  bool point_times_are_good_;
   bool open_ = false;                         // something seems wrong, and more data would make it sure
   double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock
   std::optional<TranslationFit> translation_;

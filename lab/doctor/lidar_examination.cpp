@@ -96,6 +96,32 @@ void Examination::examine_point_times() {
   const SO3 start = SO3::nearest(lidar_.error * robot_.lidar.T_imu_lidar.R.matrix());
   const MountFit first = fit_mount(lidar_turns_, path, start, lidar_.offset);
   Deskew deskew{&path, first.fit.good ? first.R : start, first.fit.good ? first.offset : lidar_.offset, false};
+  if (!point_times_are_good_) deskew.reversed = point_times_run_backwards(deskew);
+  way_ = scan_odometry(recorded_.sweeps, deskew);
+  // Once more with the mount and the clock that follow: sweeps taken as rigid shift both a little.
+  const MountFit again = fit_mount(turns_of(way_), path, deskew.R_IL, deskew.offset);
+  if (!again.fit.good) return;
+  gyro_bias_ = again.bias;
+  const GyroPath better = gyro();
+  deskew.gyro = &better;
+  deskew.R_IL = again.R;
+  deskew.offset = again.offset;
+  // What the acceleration says of the velocity within a sweep; with a wrong description it fits nothing, and is left out.
+  const auto fit = TranslationRows(way_, recorded_.imu, better, again.R, again.offset).fit(accel_axes_);
+  // A place that is hardly known would make the way that it is measured by.
+  SE3 T_IL{again.R, robot_.lidar.T_imu_lidar.p};
+  for (int i = 0; fit && i < 3; ++i) {
+    if (std::abs(fit->r[i] - T_IL.p[i]) > sure * fit->sigma_r(i)) T_IL.p[i] = fit->r[i];
+  }
+  const LidarWay swung(fit && fit->rms < believable ? way_ : std::vector<SweepPose>{}, T_IL, again.offset, mended_imu(), better,
+                       fit ? fit->g_W : Eigen::Vector3d::Zero(), fit ? fit->ba : Eigen::Vector3d::Zero());
+  deskew.way = swung.empty() ? nullptr : &swung;
+  deskew.p_IL = T_IL.p;
+  way_ = scan_odometry(recorded_.sweeps, deskew);
+}
+
+// With the times as they come, or reversed, or without: which leaves the thinnest surfaces.
+bool Examination::point_times_run_backwards(Deskew deskew) {
   // The stretch that turns most.
   std::size_t best = 0;
   double most = -1;
@@ -103,7 +129,7 @@ void Examination::examine_point_times() {
   std::vector<double> sums(recorded_.sweeps.size() + 1, 0);
   for (std::size_t i = 0; i < recorded_.sweeps.size(); ++i) {
     const Sweep& s = recorded_.sweeps[i];
-    sums[i + 1] = sums[i] + (path.covers(s.begin, s.end) && s.end > s.begin ? path.rate(s.begin, s.end).norm() : 0);
+    sums[i + 1] = sums[i] + (deskew.gyro->covers(s.begin, s.end) && s.end > s.begin ? deskew.gyro->rate(s.begin, s.end).norm() : 0);
   }
   for (std::size_t i = 0; i + stretch < sums.size(); ++i) {
     if (sums[i + stretch] - sums[i] <= most) continue;
@@ -129,32 +155,10 @@ void Examination::examine_point_times() {
           "",
           {},
           true});
-    deskew.reversed = true;
-  } else {
-    check(Sensor::lidar, "point times", forward <= rigid / clearly ? Check::Verdict::good : Check::Verdict::note, evidence);
-    deskew.reversed = false;
+    return true;
   }
-  way_ = scan_odometry(recorded_.sweeps, deskew);
-  // Once more with the mount and the clock that follow: sweeps taken as rigid shift both a little.
-  const MountFit again = fit_mount(turns_of(way_), path, deskew.R_IL, deskew.offset);
-  if (!again.fit.good) return;
-  gyro_bias_ = again.bias;
-  const GyroPath better = gyro();
-  deskew.gyro = &better;
-  deskew.R_IL = again.R;
-  deskew.offset = again.offset;
-  // What the acceleration says of the velocity within a sweep; with a wrong description it fits nothing, and is left out.
-  const auto fit = TranslationRows(way_, recorded_.imu, better, again.R, again.offset).fit(accel_axes_);
-  // A place that is hardly known would make the way that it is measured by.
-  SE3 T_IL{again.R, robot_.lidar.T_imu_lidar.p};
-  for (int i = 0; fit && i < 3; ++i) {
-    if (std::abs(fit->r[i] - T_IL.p[i]) > sure * fit->sigma_r(i)) T_IL.p[i] = fit->r[i];
-  }
-  const LidarWay swung(fit && fit->rms < believable ? way_ : std::vector<SweepPose>{}, T_IL, again.offset, mended_imu(), better,
-                       fit ? fit->g_W : Eigen::Vector3d::Zero(), fit ? fit->ba : Eigen::Vector3d::Zero());
-  deskew.way = swung.empty() ? nullptr : &swung;
-  deskew.p_IL = T_IL.p;
-  way_ = scan_odometry(recorded_.sweeps, deskew);
+  check(Sensor::lidar, "point times", forward <= rigid / clearly ? Check::Verdict::good : Check::Verdict::note, evidence);
+  return false;
 }
 
 void Examination::examine_lidar_rotation() {
