@@ -235,7 +235,7 @@ class Trials:
             if said:
                 self.distrusted.append(f"{modality}{' ' if words else ''}{' '.join(words)}: {said}")
             if judged and said and said.startswith(WRONG_DESCRIPTION):
-                # What is left then is of fewer sensors than the table says.
+                # What is left then is of fewer sensors than the table says, or of another description than its other columns.
                 outcome = self._run(modality, (*words, TRUSTING), out)
             self._known[key] = outcome
         return self._known[key]
