@@ -65,8 +65,9 @@ class Examination {
   void examine_lidar();
   void examine_point_times();
   bool point_times_run_backwards(Deskew deskew);
-  void examine_lidar_rotation();
-  void examine_lidar_clock();
+  /// Of rotation, clock and gyro bias at once.
+  MountFit examine_lidar_rotation();
+  void examine_lidar_clock(const MountFit& fit);
   void examine_lidar_position();
   // leg_examination.cpp
   void examine_legs();

@@ -68,11 +68,11 @@ void Examination::examine_lidar() {
   }
   const std::size_t before = diagnosis_.findings.size();
   examine_point_times();
-  examine_lidar_rotation();
+  const MountFit fit = examine_lidar_rotation();
   // Without times a sweep is taken at its stamp: that half a sweep is missing is no fault of the clock.
   if (diagnosis_.findings.size() > before && diagnosis_.findings[before].cause == "point_times_absent") return;
   if (way_.empty()) return;
-  examine_lidar_clock();
+  examine_lidar_clock(fit);
   examine_lidar_position();
 }
 
@@ -161,7 +161,7 @@ bool Examination::point_times_run_backwards(Deskew deskew) {
   return false;
 }
 
-void Examination::examine_lidar_rotation() {
+MountFit Examination::examine_lidar_rotation() {
   const std::vector<Turn> turns = way_.empty() ? lidar_turns_ : turns_of(way_);
   if (way_.empty()) way_ = rigid_;
   const SO3 described = robot_.lidar.T_imu_lidar.R;
@@ -170,7 +170,7 @@ void Examination::examine_lidar_rotation() {
   const MountFit fit = refine_mount(turns, path, fit_mount(turns, path, start, lidar_.offset));
   if (!fit.fit.good) {
     check(Sensor::lidar, "rotation of the mount", Check::Verdict::unknown, "too few sweeps could be registered");
-    return;
+    return fit;
   }
   lidar_.offset = fit.offset;
   lidar_.error = (fit.R * described.inverse()).matrix();
@@ -190,7 +190,7 @@ void Examination::examine_lidar_rotation() {
                         : Check::Verdict::good,
           detail + (note ? ": could be calibrated" : ""));
     open_ |= angle > lidar_rotation_tolerance;
-    return;
+    return fit;
   }
   // Points that are mirrored turn as those of a LiDAR that is turned by half a turn do; their way differs.
   const Eigen::Matrix3d M = -(described.inverse() * fit.R).matrix();
@@ -209,7 +209,7 @@ void Examination::examine_lidar_rotation() {
             {},
             true});
       way_.clear();
-      return;
+      return fit;
     }
   }
   Finding f;
@@ -233,13 +233,10 @@ void Examination::examine_lidar_rotation() {
                            100 * fit.explained, 100 * lidar_.as_described, detail);
   robot_.lidar.T_imu_lidar.R = fit.R;
   find_rotation(std::move(f), described, fit.R, "lidar.T_imu_lidar.R");
+  return fit;
 }
 
-void Examination::examine_lidar_clock() {
-  const std::vector<Turn> turns = turns_of(way_);
-  const GyroPath path = gyro();
-  const MountFit fit =
-      refine_mount(turns, path, fit_mount(turns, path, SO3::nearest(lidar_.error * original_.lidar.T_imu_lidar.R.matrix()), lidar_.offset));
+void Examination::examine_lidar_clock(const MountFit& fit) {
   if (!fit.fit.good) return;
   const double sigma = fit.offset_sigma();
   constexpr double method = 0.00015;  // s
