@@ -119,7 +119,7 @@ std::optional<Eigen::Vector3d> LegKinematics::Chains::force_on(std::size_t side,
   return T_IL.R * force;
 }
 
-LegKinematics::LegKinematics(const Robot& robot, bool forces) : chains_(std::make_unique<Chains>()) {
+LegKinematics::LegKinematics(const Robot& robot, bool forces, const LinkTree* tree) : chains_(std::make_unique<Chains>()) {
   Chains& c = *chains_;
   c.forces = forces;
   c.mount = robot.legs;
@@ -128,12 +128,12 @@ LegKinematics::LegKinematics(const Robot& robot, bool forces) : chains_(std::mak
   c.T_IL = robot.imu.T_link_imu.inverse();
   if (!c.by_joints) return;
   if (robot.urdf.empty()) throw std::invalid_argument("robot.urdf is needed to use the legs");
-  const LinkTree tree(robot);
+  const auto own = tree == nullptr ? std::make_unique<LinkTree>(robot) : nullptr;
   for (std::size_t side = 0; side < 2; ++side) {
     const Foot& foot = robot.feet[side];
     if (foot.sole.empty() || foot.sole.size() > max_corners)
       throw std::invalid_argument("robot.feet: the sole of " + foot.name + " needs 1 to " + std::to_string(max_corners) + " points");
-    c.legs[side] = tree.chain(robot.imu.link, foot.link);
+    c.legs[side] = (tree == nullptr ? *own : *tree).chain(robot.imu.link, foot.link);
   }
 }
 

@@ -14,6 +14,8 @@
 
 namespace kilvo {
 
+class LinkTree;
+
 /// Corner points of one sole at most.
 inline constexpr int max_corners = 8;
 
@@ -45,8 +47,8 @@ SolePoint lowest_point(const FootPose& foot, const Eigen::Vector3d& up_I);
 class LegKinematics {
  public:
   /// Throws std::invalid_argument naming the link or joint when the URDF cannot be used.
-  /// `forces`: Feet::force_I is wanted.
-  explicit LegKinematics(const Robot& robot, bool forces = false);
+  /// `forces`: Feet::force_I is wanted. `tree`: of robot.urdf, where it has been read before.
+  explicit LegKinematics(const Robot& robot, bool forces = false, const LinkTree* tree = nullptr);
   LegKinematics(LegKinematics&&) noexcept;
   ~LegKinematics();
 

@@ -20,6 +20,7 @@ namespace kilvo::lab {
 inline constexpr double sure = 4;              // standard deviations
 inline constexpr double gravity = 9.80665;     // m/s^2
 inline constexpr double turn_interval = 0.04;  // s, of a turn of the legs
+inline constexpr double pose_period = 0.009;   // s, between poses of the legs
 
 /// How one sense's turning agrees with the gyro's.
 struct SenseAgreement {
@@ -85,8 +86,8 @@ class Examination {
     Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
     double cost() const;
   };
-  LegScore score_legs(const LegHypothesis* hypothesis, double offset, bool any_mount) const;
-  std::vector<LegPose> legs_under(const LegHypothesis* hypothesis) const;
+  LegScore score_legs(const std::vector<LegPose>& path, double offset, bool any_mount) const;
+  std::vector<LegPose> legs_under(const LegHypothesis* hypothesis, double period = pose_period) const;
   bool try_leg_hypotheses();
   MountFit measure_leg_mount() const;
   void examine_leg_rotation();
@@ -126,6 +127,7 @@ class Examination {
   void find_rotation(Finding finding, const SO3& before, const SO3& after, const std::string& key);
 
   const Recorded& recorded_;
+  mutable RecordedLegs recorded_legs_{recorded_};
   Robot robot_, original_;
   Eigen::Matrix3d gyro_axes_ = Eigen::Matrix3d::Identity();  // take what was written to rad/s and m/s^2 in the IMU frame
   Eigen::Matrix3d accel_axes_ = Eigen::Matrix3d::Identity();

@@ -20,6 +20,7 @@ Eigen::Quaterniond exp_of(const Eigen::Vector3d& v) {
 GyroPath::GyroPath(const std::vector<InertialSample>& imu, const Eigen::Matrix3d& axes, const Eigen::Vector3d& bias) {
   t_.reserve(imu.size());
   R_.reserve(imu.size());
+  steps_.reserve(imu.size());
   forces_.reserve(imu.size());
   Eigen::Quaterniond R = Eigen::Quaterniond::Identity();
   const InertialSample* before = nullptr;
@@ -27,8 +28,10 @@ GyroPath::GyroPath(const std::vector<InertialSample>& imu, const Eigen::Matrix3d
     if (before != nullptr) {
       const double dt = s.t - before->t;
       if (!(dt > 0)) continue;
-      const Eigen::Vector3d mean = axes * (0.5 * (s.gyro + before->gyro)) - bias;
-      R = (R * exp_of(mean * dt)).normalized();
+      steps_.emplace_back((axes * (0.5 * (s.gyro + before->gyro)) - bias) * dt);
+      R = (R * exp_of(steps_.back())).normalized();
+    } else {
+      steps_.emplace_back(Eigen::Vector3d::Zero());
     }
     before = &s;
     t_.push_back(s.t);
@@ -38,12 +41,17 @@ GyroPath::GyroPath(const std::vector<InertialSample>& imu, const Eigen::Matrix3d
 }
 
 Eigen::Quaterniond GyroPath::at(double t) const {
-  const auto after = std::ranges::upper_bound(t_, t);
-  if (after == t_.begin()) return R_.front();
-  if (after == t_.end()) return R_.back();
-  const auto i = static_cast<std::size_t>(after - t_.begin());
+  if (t < t_.front()) return R_.front();
+  if (t >= t_.back()) return R_.back();
+  // The first sample after `t` is near where it would be at a constant rate.
+  const double last = static_cast<double>(t_.size() - 1), expected = (t - t_.front()) / (t_.back() - t_.front()) * last;
+  constexpr double near = 8;  // samples
+  auto from = t_.begin() + static_cast<std::ptrdiff_t>(std::max(expected - near, 0.0));
+  auto to = t_.begin() + static_cast<std::ptrdiff_t>(std::min(expected + near, last));
+  if (t < *from || t >= *to) from = t_.begin(), to = t_.end();
+  const auto i = static_cast<std::size_t>(std::upper_bound(from, to, t) - t_.begin());
   const double share = (t - t_[i - 1]) / (t_[i] - t_[i - 1]);
-  return R_[i - 1] * exp_of(share * log_of(R_[i - 1].conjugate() * R_[i]));
+  return R_[i - 1] * exp_of(share * steps_[i]);
 }
 
 Eigen::Vector3d GyroPath::rate(double a, double b) const { return log_of(between(a, b)) / (b - a); }

@@ -29,6 +29,7 @@ class GyroPath {
  private:
   std::vector<double> t_;
   std::vector<Eigen::Quaterniond> R_;
+  std::vector<Eigen::Vector3d> steps_;   // rad: the turn until each time from the one before
   std::vector<Eigen::Vector3d> forces_;  // sum of those until each time
 };
 

@@ -12,7 +12,6 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double pose_period = 0.009;  // s between poses
 constexpr double least_explained = 0.5;
 constexpr double much_better_legs = 0.6;  // of the cost that a hypothesis may leave
 
@@ -44,17 +43,16 @@ bool mentions(const std::string& text, const std::string& word) {
 
 double Examination::LegScore::cost() const { return 1 - std::max(explained, -1.0) + 0.5 * std::min(flatness, 20.0) / 20; }
 
-std::vector<LegPose> Examination::legs_under(const LegHypothesis* hypothesis) const {
+std::vector<LegPose> Examination::legs_under(const LegHypothesis* hypothesis, double period) const {
   LegHypothesis both;
   if (hypothesis != nullptr) both = *hypothesis;
   if (leg_mend_ && hypothesis != &*leg_mend_) both = joined(*leg_mend_, both);
-  return leg_path(recorded_, robot_, &both, pose_period, nullptr);
+  return recorded_legs_.path(robot_, &both, period, nullptr);
 }
 
 // How far the soles are from flat on the ground while the robot stands still.
-Examination::LegScore Examination::score_legs(const LegHypothesis* hypothesis, double offset, bool any_mount) const {
+Examination::LegScore Examination::score_legs(const std::vector<LegPose>& path, double offset, bool any_mount) const {
   LegScore out;
-  const std::vector<LegPose> path = legs_under(hypothesis);
   const std::vector<Turn> turns = leg_turns(path, turn_interval);
   const GyroPath gyro_path = gyro();
   const SO3 described = robot_.imu.T_link_imu.R.inverse();
@@ -75,7 +73,7 @@ Examination::LegScore Examination::score_legs(const LegHypothesis* hypothesis, d
   for (const LegPose& pose : path) {
     const double t = pose.t + offset;
     if (!gyro_path.covers(t - 0.1, t + 0.1) || gyro_path.rate(t - 0.1, t + 0.1).norm() > 0.05) continue;
-    if (k++ % 20 != 0) continue;
+    if (k++ % 6 != 0) continue;
     const Eigen::Vector3d left = normal_of(pose.foot[0]), right = normal_of(pose.foot[1]);
     if (left.isZero() || right.isZero()) continue;
     angles.push_back(angle_between(left, right));
@@ -151,7 +149,7 @@ bool Examination::examine_leg_names() {
           true});
   }
   std::string why;
-  if (leg_path(recorded_, robot_, nullptr, 0.2, &why).empty()) {
+  if (recorded_legs_.path(robot_, nullptr, 0.2, &why).empty()) {
     find({Sensor::legs,
           "urdf",
           fmt::format("the messages of the legs do not fit the URDF: {}", why),
@@ -204,7 +202,8 @@ bool Examination::legs_turned() const {
 
 // A link that turns as this one does, and as it lies: only the place of the IMU would differ, which the turning does not show.
 bool Examination::turns_with_link(const LegHypothesis& other) const {
-  const std::vector<LegPose> here = legs_under(nullptr), there = legs_under(&other);
+  constexpr double rarely = 1;  // s
+  const std::vector<LegPose> here = legs_under(nullptr, rarely), there = legs_under(&other, rarely);
   if (here.empty() || here.size() != there.size()) return false;
   constexpr double alike = 0.17;  // rad
   return std::ranges::all_of(std::array{std::size_t{0}, here.size() / 2, here.size() - 1},
@@ -212,24 +211,30 @@ bool Examination::turns_with_link(const LegHypothesis& other) const {
 }
 
 bool Examination::try_leg_hypotheses() {
-  const LegScore described = score_legs(nullptr, leg_offset_, false), free = score_legs(nullptr, leg_offset_, true);
+  constexpr double period = turn_interval - 1e-4;  // s: a pose at each end of a turn
+  const std::vector<LegPose> as_described = legs_under(nullptr, period);
+  const LegScore described = score_legs(as_described, leg_offset_, false), free = score_legs(as_described, leg_offset_, true);
   const double cost = std::min(described.cost(), free.cost());
   constexpr double well = 0.008;  // of a description that needs no other
   if (cost < well) return false;
   const LegHypothesis* best = nullptr;
   double least = std::min(much_better_legs * cost, cost - well);
   LegScore score;
-  std::vector<LegHypothesis> all = leg_hypotheses(recorded_, robot_);
+  std::vector<LegHypothesis> all = leg_hypotheses(recorded_legs_, robot_);
   // Among so many one fits a little by chance: it has to explain nearly all.
   constexpr double senseless = 0.3, makes_sense = 0.75;  // cost, share
   const std::size_t plain = all.size();
   if (cost > senseless) {
-    for (LegHypothesis& h : gross_leg_hypotheses(recorded_, robot_)) all.push_back(std::move(h));
+    for (LegHypothesis& h : gross_leg_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
   }
   for (const LegHypothesis& h : all) {
     if (h.cause == "imu_link" && turns_with_link(h)) continue;
-    const LegScore other = std::min(score_legs(&h, leg_offset_, false), score_legs(&h, 0, false),
-                                    [](const LegScore& a, const LegScore& b) { return a.cost() < b.cost(); });
+    const std::vector<LegPose> path = legs_under(&h, period);
+    LegScore other = score_legs(path, 0, false);
+    if (leg_offset_ != 0) {
+      const LegScore late = score_legs(path, leg_offset_, false);
+      if (late.cost() <= other.cost()) other = late;
+    }
     if (other.cost() >= least || other.explained < (static_cast<std::size_t>(&h - all.data()) < plain ? least_explained : makes_sense))
       continue;
     least = other.cost();

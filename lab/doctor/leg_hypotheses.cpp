@@ -83,30 +83,10 @@ std::vector<LegHypothesis> exchanges(const std::vector<std::size_t>& joints, con
 
 }  // namespace
 
-std::vector<std::size_t> joints_that_matter(const Recorded& recorded, const Robot& robot) {
-  std::vector<std::size_t> out;
-  if (recorded.legs.empty()) return out;
-  Recorded one;
-  one.joint_names = recorded.joint_names;
-  one.legs = {recorded.legs[recorded.legs.size() / 2]};
-  const auto before = leg_path(one, robot, nullptr, 0, nullptr);
-  if (before.empty()) return out;
-  for (std::size_t i = 0; i < recorded.joint_names.size(); ++i) {
-    Recorded moved = one;
-    moved.legs[0].position[i] += 0.3;
-    const auto after = leg_path(moved, robot, nullptr, 0, nullptr);
-    if (after.empty()) continue;
-    double change = 0;
-    for (std::size_t f = 0; f < 2; ++f) change += (after[0].foot[f].R_IF.matrix() - before[0].foot[f].R_IF.matrix()).norm();
-    if (change > 1e-6) out.push_back(i);
-  }
-  return out;
-}
-
-std::vector<LegHypothesis> gross_leg_hypotheses(const Recorded& recorded, const Robot& robot) {
+std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot& robot) {
   std::vector<LegHypothesis> out;
-  const std::vector<std::size_t> joints = joints_that_matter(recorded, robot);
-  const auto& names = recorded.joint_names;
+  const std::vector<std::size_t> joints = legs.joints_that_matter(robot);
+  const auto& names = legs.recorded().joint_names;
   LegHypothesis all;
   all.cause = "joint_sign";
   all.name = "all joints of the legs turn the other way round";
@@ -171,10 +151,10 @@ LegHypothesis joined(const LegHypothesis& a, const LegHypothesis& b) {
   return out;
 }
 
-std::vector<LegHypothesis> leg_hypotheses(const Recorded& recorded, const Robot& robot) {
+std::vector<LegHypothesis> leg_hypotheses(RecordedLegs& legs, const Robot& robot) {
   std::vector<LegHypothesis> out;
-  const std::vector<std::size_t> joints = joints_that_matter(recorded, robot);
-  const auto& names = recorded.joint_names;
+  const std::vector<std::size_t> joints = legs.joints_that_matter(robot);
+  const auto& names = legs.recorded().joint_names;
   if (std::ranges::any_of(joints, [&](std::size_t i) { return has_side(names[i]); })) {
     LegHypothesis h;
     h.cause = "joints_swapped";

@@ -6,13 +6,10 @@
 namespace kilvo::lab {
 
 /// Names that are exchanged or shifted, joints that turn the other way.
-std::vector<LegHypothesis> leg_hypotheses(const Recorded& recorded, const Robot& robot);
-
-/// The joints that move a foot when they turn, by their place in the messages.
-std::vector<std::size_t> joints_that_matter(const Recorded& recorded, const Robot& robot);
+std::vector<LegHypothesis> leg_hypotheses(RecordedLegs& legs, const Robot& robot);
 
 /// Zeros that are off by a quarter of a turn, joints of one leg that are exchanged, all signs: many, for legs that make no sense otherwise.
-std::vector<LegHypothesis> gross_leg_hypotheses(const Recorded& recorded, const Robot& robot);
+std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot& robot);
 
 /// Joint positions are in degrees.
 LegHypothesis degrees_hypothesis();

@@ -161,7 +161,7 @@ Examination::LegWay Examination::measure_leg_way(const LegHypothesis* hypothesis
 
 // Legs of the same axes left and right turn the same when their joints are exchanged; only the way differs.
 bool Examination::accuse_exchanged_legs(double scale, const std::string& evidence) {
-  for (const LegHypothesis& h : leg_hypotheses(recorded_, robot_)) {
+  for (const LegHypothesis& h : leg_hypotheses(recorded_legs_, robot_)) {
     if (h.cause != "joints_swapped") continue;
     const LegWay way = measure_leg_way(&h);
     if (!std::isfinite(way.sigma) || std::abs(way.scale - 1) > std::min(scale_tolerance, 0.5 * std::abs(scale - 1))) return false;

@@ -48,7 +48,7 @@ void Examination::examine_leg_rotation() {
   }
   StanceFit stances;
   if (!way.empty())
-    stances = fit_stances(recorded_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(),
+    stances = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(),
                           fit.fit.good && !leg_start_ ? fit.offset : leg_offset_);
   if (!fit.fit.good && !stances.good) {
     check(Sensor::legs, "mount of the IMU", Check::Verdict::unknown, "too few steps");

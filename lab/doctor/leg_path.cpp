@@ -4,19 +4,24 @@
 
 namespace kilvo::lab {
 
-std::vector<LegPose> leg_path(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, double period,
-                              std::string* why) {
+LegKinematics RecordedLegs::kinematics(const Robot& robot) {
+  if (robot.urdf.empty()) return LegKinematics(robot);
+  const auto tree = trees_.try_emplace({robot.urdf, robot.locked_joints}, robot).first;
+  return LegKinematics(robot, false, &tree->second);
+}
+
+std::vector<LegPose> RecordedLegs::path(const Robot& robot, const LegHypothesis* hypothesis, double period, std::string* why) {
   std::vector<LegPose> out;
   Robot of_link = robot;
   of_link.imu.T_link_imu = SE3{};  // the IMU's mount is what shall be judged
   if (hypothesis != nullptr && hypothesis->robot) hypothesis->robot(of_link);
   JointSample sample;
-  sample.names = recorded.joint_names;
+  sample.names = recorded_.joint_names;
   if (hypothesis != nullptr && hypothesis->names) hypothesis->names(sample.names);
   try {
-    LegKinematics kinematics(of_link);
+    LegKinematics legs = kinematics(of_link);
     double last = -1e9;
-    for (const LegSample& leg : recorded.legs) {
+    for (const LegSample& leg : recorded_.legs) {
       if (leg.t - last < period) continue;
       sample.t = time_from_ns(0) + from_seconds(leg.t);
       sample.position = leg.position;
@@ -24,7 +29,7 @@ std::vector<LegPose> leg_path(const Recorded& recorded, const Robot& robot, cons
       if (hypothesis != nullptr && hypothesis->position) {
         for (std::size_t i = 0; i < sample.position.size(); ++i) hypothesis->position(i, sample.position[i]);
       }
-      const auto feet = kinematics.feet(sample);
+      const auto feet = legs.feet(sample);
       if (const auto* reason = std::get_if<std::string>(&feet)) {
         if (why != nullptr) *why = *reason;
         continue;
@@ -34,6 +39,32 @@ std::vector<LegPose> leg_path(const Recorded& recorded, const Robot& robot, cons
     }
   } catch (const std::invalid_argument& error) {
     if (why != nullptr) *why = error.what();
+  }
+  return out;
+}
+
+std::vector<std::size_t> RecordedLegs::joints_that_matter(const Robot& robot) {
+  std::vector<std::size_t> out;
+  if (recorded_.legs.empty()) return out;
+  JointSample sample;
+  sample.names = recorded_.joint_names;
+  sample.position = recorded_.legs[recorded_.legs.size() / 2].position;
+  sample.velocity.assign(sample.position.size(), 0);
+  try {
+    LegKinematics legs = kinematics(robot);
+    const auto before = legs.feet(sample);
+    for (std::size_t i = 0; std::holds_alternative<Feet>(before) && i < sample.position.size(); ++i) {
+      JointSample moved = sample;
+      moved.position[i] += 0.3;
+      const auto after = legs.feet(moved);
+      if (!std::holds_alternative<Feet>(after)) continue;
+      double change = 0;
+      for (std::size_t f = 0; f < 2; ++f)
+        change += (std::get<Feet>(after).foot[f].R_IF.matrix() - std::get<Feet>(before).foot[f].R_IF.matrix()).norm();
+      if (change > 1e-6) out.push_back(i);
+    }
+  } catch (const std::invalid_argument&) {
+    out.clear();
   }
   return out;
 }

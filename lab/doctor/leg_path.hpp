@@ -2,10 +2,12 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "kilvo/legs/joint_chain.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
 #include "lab/doctor/recorded.hpp"
 #include "lab/doctor/turns.hpp"
@@ -30,9 +32,23 @@ struct LegPose {
   std::array<FootPose, 2> foot;  // in the link's frame: R_IF and p are of the link, not of the IMU
 };
 
-/// Empty, with the reason in `why`, when the description cannot be used with these messages. Thinned to `period` (s).
-std::vector<LegPose> leg_path(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, double period,
-                              std::string* why);
+/// The legs of a recording, under any description: a URDF is read once.
+class RecordedLegs {
+ public:
+  explicit RecordedLegs(const Recorded& recorded) : recorded_(recorded) {}
+  const Recorded& recorded() const { return recorded_; }
+
+  /// Empty, with the reason in `why`, when the description cannot be used with these messages. Thinned to `period` (s).
+  std::vector<LegPose> path(const Robot& robot, const LegHypothesis* hypothesis, double period, std::string* why);
+  /// The joints that move a foot when they turn, by their place in the messages.
+  std::vector<std::size_t> joints_that_matter(const Robot& robot);
+
+ private:
+  LegKinematics kinematics(const Robot& robot);
+
+  const Recorded& recorded_;
+  std::map<std::pair<std::string, std::vector<std::string>>, LinkTree> trees_;  // by document and locked joints
+};
 
 /// The link's turning while either foot stands.
 std::vector<Turn> leg_turns(const std::vector<LegPose>& path, double interval);

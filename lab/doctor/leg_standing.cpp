@@ -22,10 +22,10 @@ bool Examination::find_leg_start() {
   if (way.empty() || (legs_.known && legs_.agrees)) return false;
   const GyroPath path = gyro();
   const LegHypothesis* mend = leg_mend_ ? &*leg_mend_ : nullptr;
-  const Standing described = standing_time(recorded_, robot_, mend, way, path, 0);
+  const Standing described = standing_time(recorded_legs_, robot_, mend, way, path, 0);
   constexpr double enough = 0.1;  // of the time in which the robot moves: soles that seem to stand by chance do so for a hundredth of it
   if (described.worth() > enough * described.moving) return false;
-  const LegStart start = longest_standing(recorded_, robot_, mend, way, path, upright_mounts());
+  const LegStart start = longest_standing(recorded_legs_, robot_, mend, way, path, upright_mounts());
   if (start.standing.worth() < clearly * described.worth() + least_standing) return false;
   if (try_standing_hypotheses(start.standing.worth())) return true;
   leg_offset_ = start.offset;
@@ -55,13 +55,16 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   const auto stands = [&](const LegHypothesis* h) {
     LegHypothesis both = h != nullptr ? *h : LegHypothesis{};
     if (leg_mend_) both = joined(*leg_mend_, both);
-    return standing_time(recorded_, robot_, &both, way, path, leg_offset_);
+    return standing_time(recorded_legs_, robot_, &both, way, path, leg_offset_);
   };
   const Standing described = stands(nullptr);
   double most = std::max(longer_than, clearly * described.worth() + least_standing), longer = clearly * described.both();
-  std::vector<LegHypothesis> all = leg_hypotheses(recorded_, robot_);
+  // Soles that stand that long leave no room for others that would stand clearly longer, but for those on links above the ankles.
+  constexpr double well = 0.45;  // of the time in which the robot moves
+  std::vector<LegHypothesis> all;
+  if (described.worth() < well * described.moving) all = leg_hypotheses(recorded_legs_, robot_);
   if (described.worth() < least_standing) {
-    for (LegHypothesis& h : gross_leg_hypotheses(recorded_, robot_)) all.push_back(std::move(h));
+    for (LegHypothesis& h : gross_leg_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
     for (LegHypothesis& h : size_hypotheses()) all.push_back(std::move(h));
   }
   const std::size_t joints = all.size();
@@ -100,7 +103,7 @@ bool Examination::feet_stand() const {
   constexpr double still = 0.002, near = 0.09;  // m, rad
   Robot start = robot_;
   if (leg_start_) start.imu.T_link_imu.R = *leg_start_;
-  const StanceFit fit = fit_stances(recorded_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(), leg_offset_);
+  const StanceFit fit = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(), leg_offset_);
   return fit.good && fit.moved < still && (leg_start_ || (fit.R_link_imu * robot_.imu.T_link_imu.R.inverse()).Log().norm() < near);
 }
 

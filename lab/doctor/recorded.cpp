@@ -13,6 +13,15 @@ constexpr float nearest_point = 0.5F;  // m: nearer points may be the robot's ow
 
 }  // namespace
 
+Recorded thinned(Recorded recorded, std::size_t step) {
+  for (Sweep& sweep : recorded.sweeps) {
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < sweep.points.size(); i += step) sweep.points[n++] = sweep.points[i];
+    sweep.points.resize(n);
+  }
+  return recorded;
+}
+
 double Recorder::seconds(Time t) {
   if (!begun_) recorded_.origin = to_ns(t);
   begun_ = true;

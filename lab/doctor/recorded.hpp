@@ -52,6 +52,9 @@ struct Recorded {
   bool leg_clock_is_found = false;  // by the program (legs.clock): the legs' stamps are no part of the description
 };
 
+/// With every so many points of each sweep left.
+Recorded thinned(Recorded recorded, std::size_t step);
+
 /// Takes measurements in the order in which they arrive.
 class Recorder {
  public:

@@ -17,7 +17,8 @@ constexpr double far = 8;                 // m, beyond which points go to the co
 constexpr double sensor_noise = 0.02;     // m
 constexpr double gate = 0.5;              // m
 constexpr int sweep_iterations = 10;
-constexpr std::size_t used = 1500;       // points of a sweep that are registered
+constexpr std::size_t stride = 4;        // of the points of a sweep, those that are registered
+constexpr std::size_t least_used = 500;  // of them, where there are as many
 constexpr std::size_t enough = 60;       // of them on planes
 constexpr double velocity_change = 1.0;  // m/s from sweep to sweep, standard deviation
 constexpr double velocity_known = 0.02;  // m/s, by a way that was found before
@@ -183,8 +184,8 @@ class Odometry {
       std::vector<double> distances;
       rows_.clear();
       const Eigen::Matrix3d R = pose.T_WL.R.matrix(), back = R.transpose();
-      const std::size_t stride = std::max<std::size_t>(1, points_.size() / used);
-      for (std::size_t i = 0; i < points_.size(); i += stride) {
+      const std::size_t step = std::clamp<std::size_t>(points_.size() / least_used, 1, stride);
+      for (std::size_t i = 0; i < points_.size(); i += step) {
         const Point& p = points_[i];
         const Eigen::Vector3d arm = R * p.p;
         const Eigen::Vector3d at = arm + pose.T_WL.p + p.dt * pose.v_W;

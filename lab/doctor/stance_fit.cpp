@@ -48,11 +48,11 @@ Eigen::Vector3d middle_of(const FootPose& foot) {
 
 class Stances {
  public:
-  Stances(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
+  Stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
           double offset, bool with_zeros)
       : way_(way), gyro_(gyro), T_LI_(robot.imu.T_link_imu), offset_(offset) {
-    if (with_zeros) joints_ = joints_that_matter(recorded, robot);
-    const std::vector<LegPose> path = leg_path(recorded, robot, hypothesis, sample_period, nullptr);
+    if (with_zeros) joints_ = legs.joints_that_matter(robot);
+    const std::vector<LegPose> path = legs.path(robot, hypothesis, sample_period, nullptr);
     const auto n = static_cast<Eigen::Index>(joints_.size());
     for (const LegPose& pose : path) {
       if (with_zeros && (!way.at(pose.t + offset - stance_slack, gyro) || !way.at(pose.t + offset + stance_slack, gyro))) continue;
@@ -61,7 +61,7 @@ class Stances {
         s.sole[f] = {middle_of(pose.foot[f]), pose.foot[f].R_IF, Eigen::MatrixXd::Zero(3, n), Eigen::MatrixXd::Zero(3, n)};
       samples_.push_back(std::move(s));
     }
-    for (Eigen::Index j = 0; j < n; ++j) differentiate(recorded, robot, hypothesis, j);
+    for (Eigen::Index j = 0; j < n; ++j) differentiate(legs, robot, hypothesis, j);
   }
 
   Eigen::Index unknowns() const { return of_zeros + static_cast<Eigen::Index>(joints_.size()); }
@@ -152,7 +152,7 @@ class Stances {
     return a && b && (b->p - a->p).norm() > slow * 2 * stance_slack;
   }
 
-  void differentiate(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, Eigen::Index j) {
+  void differentiate(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, Eigen::Index j) {
     LegHypothesis h = hypothesis != nullptr ? *hypothesis : LegHypothesis{};
     const std::size_t joint = joints_[static_cast<std::size_t>(j)];
     for (const double side : {1.0, -1.0}) {
@@ -161,7 +161,7 @@ class Stances {
         if (i == joint) q += side * nudge;
       };
       std::size_t k = 0;
-      for (const LegPose& pose : leg_path(recorded, robot, &h, sample_period, nullptr)) {
+      for (const LegPose& pose : legs.path(robot, &h, sample_period, nullptr)) {
         while (k < samples_.size() && samples_[k].t < pose.t) ++k;
         if (k == samples_.size() || samples_[k].t != pose.t) continue;
         for (std::size_t f = 0; f < 2; ++f) {
@@ -178,7 +178,8 @@ class Stances {
     if (!T_WI) return std::nullopt;
     const SE3 T_LI{rotation(x), T_LI_.p + x.segment<3>(of_p)};
     const Sole& sole = samples_[i].sole[f];
-    const Eigen::VectorXd zeros = x.tail(x.size() - of_zeros);
+    if (joints_.empty()) return *T_WI * T_LI.inverse() * SE3{sole.R, (1 + x[of_scale]) * sole.c};
+    const auto zeros = x.tail(x.size() - of_zeros);
     const SE3 in_link{sole.R * SO3::Exp(sole.by_R * zeros), (1 + x[of_scale]) * (sole.c + sole.by_c * zeros)};
     return *T_WI * T_LI.inverse() * in_link;
   }
@@ -194,10 +195,10 @@ class Stances {
 
 }  // namespace
 
-StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
                       const GyroPath& gyro, double offset) {
   StanceFit out;
-  Stances stances(recorded, robot, hypothesis, way, gyro, offset, true);
+  Stances stances(legs, robot, hypothesis, way, gyro, offset, true);
   const Eigen::Index n = stances.unknowns();
   Eigen::VectorXd x = Eigen::VectorXd::Zero(n), prior = Eigen::VectorXd::Constant(n, prior_zero), step(n);
   prior.head<3>().setConstant(INFINITY);
@@ -225,7 +226,7 @@ StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHyp
   out.scale_sigma = fit.sigma(of_scale);
   for (std::size_t j = 0; j < stances.joints().size(); ++j) {
     const auto i = of_zeros + static_cast<Eigen::Index>(j);
-    out.joints.push_back(recorded.joint_names[stances.joints()[j]]);
+    out.joints.push_back(legs.recorded().joint_names[stances.joints()[j]]);
     out.zero.push_back(x[i]);
     out.zero_sigma.push_back(fit.sigma(static_cast<int>(i)));
   }
@@ -234,15 +235,15 @@ StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHyp
   return out;
 }
 
-Standing standing_time(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+Standing standing_time(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
                        const GyroPath& gyro, double offset) {
-  return Stances(recorded, robot, hypothesis, way, gyro, offset, false).standing();
+  return Stances(legs, robot, hypothesis, way, gyro, offset, false).standing();
 }
 
-LegStart longest_standing(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+LegStart longest_standing(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
                           const GyroPath& gyro, const std::vector<SO3>& mounts, double reach) {
   const SO3 described = robot.imu.T_link_imu.R;
-  Stances stances(recorded, robot, hypothesis, way, gyro, 0, false);
+  Stances stances(legs, robot, hypothesis, way, gyro, 0, false);
   LegStart best;
   const auto attempt = [&](double offset, const SO3& R) {
     const Standing s = stances.standing(offset, R);

@@ -26,7 +26,7 @@ struct StanceFit {
 };
 
 /// `hypothesis`: of the legs, may be null. Starts from robot.imu.T_link_imu and `offset`.
-StanceFit fit_stances(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
                       const GyroPath& gyro, double offset);
 
 struct Standing {
@@ -38,7 +38,7 @@ struct Standing {
 };
 
 /// Legs that are described wrongly hardly ever stand.
-Standing standing_time(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+Standing standing_time(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
                        const GyroPath& gyro, double offset);
 
 struct LegStart {
@@ -49,7 +49,7 @@ struct LegStart {
 
 /// The offset within `reach` (s) with the described mount of the IMU, or the one of `mounts` without an offset, under which the soles stand
 /// longest.
-LegStart longest_standing(const Recorded& recorded, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+LegStart longest_standing(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
                           const GyroPath& gyro, const std::vector<SO3>& mounts, double reach = 1.3);
 
 }  // namespace kilvo::lab

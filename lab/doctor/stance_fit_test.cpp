@@ -48,7 +48,8 @@ class StancesOfAWalk : public testing::Test {
     return out;
   }
   LegStart found(const Recorded& recorded, const Robot& robot) const {
-    return longest_standing(recorded, robot, nullptr, way_, gyro_, mounts_);
+    RecordedLegs legs(recorded);
+    return longest_standing(legs, robot, nullptr, way_, gyro_, mounts_);
   }
 
   const Scenario scenario_ = room();
@@ -68,7 +69,8 @@ TEST_F(StancesOfAWalk, LastLongestWithTheRightClock) {
     const LegStart start = found(shifted, robot_);
     EXPECT_NEAR(start.offset, -late, 0.02);
     EXPECT_LT((start.R_link_imu * robot_.imu.T_link_imu.R.inverse()).Log().norm(), 1e-9);
-    const Standing described = standing_time(shifted, robot_, nullptr, way_, gyro_, 0);
+    RecordedLegs legs(shifted);
+    const Standing described = standing_time(legs, robot_, nullptr, way_, gyro_, 0);
     EXPECT_LT(described.worth(), 0.5 * start.standing.worth()) << late;
   }
 }
@@ -83,7 +85,8 @@ TEST_F(StancesOfAWalk, LastLongestWithTheRightMount) {
 }
 
 TEST_F(StancesOfAWalk, LastForMostOfTheWalkAsItIsDescribed) {
-  const Standing s = standing_time(recorded_, robot_, nullptr, way_, gyro_, 0);
+  RecordedLegs legs(recorded_);
+  const Standing s = standing_time(legs, robot_, nullptr, way_, gyro_, 0);
   EXPECT_GT(s.moving, 4);
   EXPECT_GT(s.worth(), 0.5 * s.moving);
 }

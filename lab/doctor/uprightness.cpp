@@ -6,7 +6,6 @@
 #include "lab/doctor/examination.hpp"
 
 namespace kilvo::lab {
-namespace {}  // namespace
 
 // From the feet to the hips, of any length.
 Eigen::Vector3d Examination::up_by_legs() const {
