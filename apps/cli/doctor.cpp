@@ -11,6 +11,7 @@
 #include "apps/cli/sensor_choice.hpp"
 #include "apps/cli/shipped_config.hpp"
 #include "apps/cli/verbs.hpp"
+#include "lab/doctor/calibration_page.hpp"
 #include "lab/doctor/diagnosis_text.hpp"
 #include "lab/doctor/examination.hpp"
 #include "lab/messages/input_error.hpp"
@@ -23,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct DoctorOptions {
-  std::string input, config, write;
+  std::string input, config, write, report;
   std::vector<std::string> overrides;
   double start = 0, duration = 60;
   bool json = false;
@@ -69,23 +70,20 @@ std::string text_of(const fs::path& path) {
   return std::move(text).str();
 }
 
-/// The configuration with what the findings say put right; everything else as it is.
-void write_corrected(const fs::path& from, const fs::path& to, const lab::Settings& settings, const lab::Diagnosis& diagnosis) {
+void override_with(DoctorOptions& options, const std::vector<lab::Change>& changes) {
+  for (const lab::Change& c : changes) options.overrides.push_back(c.key + "=" + c.value);
+}
+
+/// The configuration with these settings; everything else as it is.
+void write_changed(const fs::path& from, const fs::path& to, const lab::Settings& settings, const std::vector<lab::Change>& changes) {
   std::string text = text_of(from);
-  std::size_t changes = 0;
-  for (const lab::Finding& finding : diagnosis.findings) {
-    if (finding.changes.empty()) fmt::print(stderr, "kilvo: not changed by --write: {}: {}\n", name_of(finding.sensor), finding.remedy);
-    for (const lab::Change& change : finding.changes) {
-      text = lab::with_setting(text, change.key, change.value);
-      ++changes;
-    }
-  }
+  for (const lab::Change& change : changes) text = lab::with_setting(text, change.key, change.value);
   // A relative path means one from the configuration's own folder.
   const bool elsewhere = fs::weakly_canonical(fs::absolute(to)).parent_path() != fs::weakly_canonical(fs::absolute(from)).parent_path();
   if (elsewhere && settings.given.contains("robot.urdf")) text = lab::with_setting(text, "robot.urdf", settings.urdf_file);
   while (text.ends_with('\n')) text.pop_back();  // written with one
   write_text_file(to, text);
-  fmt::print(stderr, "kilvo: {} with {} setting{} changed\n", to.string(), changes, changes == 1 ? "" : "s");
+  fmt::print(stderr, "kilvo: {} with {} setting{} changed\n", to.string(), changes.size(), changes.size() == 1 ? "" : "s");
 }
 
 struct Judged {
@@ -100,6 +98,7 @@ Judged judge(const DoctorOptions& options) {
   const lab::Settings settings = lab::load_settings(config, options.overrides);
   const SensorChoice choice = choose_sensors(std::nullopt, settings, config.string(), {options.input});
   for (const std::string& text : choice.warnings) fmt::print(stderr, "kilvo: warning: {}\n", text);
+  fmt::print(stderr, "kilvo: looking at {:.0f} s of {}\n", options.duration, options.input);
   const lab::Recorded recorded = record(options, recording_options(options, settings, choice.used));
   lab::Examination examination(recorded, settings.robot);
   lab::Diagnosis diagnosis = examination.run();
@@ -110,29 +109,59 @@ int doctor(const DoctorOptions& options) {
   const Judged judged = judge(options);
   const lab::Diagnosis& diagnosis = judged.diagnosis;
   fmt::print("{}", options.json ? lab::to_json(diagnosis) : lab::to_text(diagnosis));
-  if (!options.write.empty()) write_corrected(judged.config, options.write, judged.settings, diagnosis);
+  if (!options.write.empty()) {
+    std::vector<lab::Change> changes;
+    for (const lab::Finding& f : diagnosis.findings) {
+      if (f.changes.empty()) fmt::print(stderr, "kilvo: not changed by --write: {}: {}\n", name_of(f.sensor), f.remedy);
+      lab::put(changes, f.changes);
+    }
+    write_changed(judged.config, options.write, judged.settings, changes);
+  }
   if (!diagnosis.good()) return run_failed;
   return diagnosis.unknown() ? unusable_input : done;
 }
 
-/// Small errors can be measured only where there are no large ones.
-int calibrate(const DoctorOptions& options) {
-  const Judged judged = judge(options);
+/// Mends what is too large to be refined, each time by what the settings before left.
+Judged mend_first(DoctorOptions& options, std::vector<lab::Finding>& mended) {
+  constexpr int most_rounds = 4;
+  Judged judged = judge(options);
+  for (int round = 1; !judged.diagnosis.good() && round < most_rounds; ++round) {
+    const auto& findings = judged.diagnosis.findings;
+    if (std::ranges::any_of(findings, [](const lab::Finding& f) { return f.changes.empty(); })) break;
+    for (const lab::Finding& f : findings) {
+      mended.push_back(f);
+      for (const lab::Change& c : f.changes) fmt::print(stderr, "kilvo: calibrate: {}; mended by {}: {}\n", f.text, c.key, c.value);
+      override_with(options, f.changes);
+    }
+    judged = judge(options);
+  }
+  return judged;
+}
+
+int calibrate(DoctorOptions options) {
+  if (!options.report.empty()) prepare_folder(options.report);
+  lab::Calibration page{options.input, options.config, {}, {}, {}};
+  const Judged judged = mend_first(options, page.mended);
   if (!judged.diagnosis.good()) {
     fmt::print("{}", options.json ? lab::to_json(judged.diagnosis) : lab::to_text(judged.diagnosis));
-    fmt::print(stderr, "kilvo: calibrate: the description is wrong; mend it first (kilvo doctor --write FILE)\n");
+    fmt::print(stderr, "kilvo: calibrate: the description is wrong, and no setting mends it (kilvo doctor shows the evidence)\n");
     return run_failed;
   }
   fmt::print("{}", options.json ? lab::to_json(judged.refinements) : lab::to_text(judged.refinements));
-  lab::Diagnosis changes;
+  std::vector<lab::Change> changes, refined;
+  for (const lab::Finding& f : page.mended) lab::put(changes, f.changes);
   for (const lab::Refinement& r : judged.refinements) {
-    if (!r.significant) continue;
-    lab::Finding f;
-    f.sensor = r.sensor;
-    f.changes = r.changes;
-    changes.findings.push_back(std::move(f));
+    if (r.significant) lab::put(refined, r.changes);
   }
-  write_corrected(judged.config, options.write, judged.settings, changes);
+  lab::put(changes, refined);
+  write_changed(judged.config, options.write, judged.settings, changes);
+  if (!options.report.empty()) {
+    override_with(options, refined);
+    page.config = judged.config.string();
+    page.before = judged.refinements;
+    page.after = judge(options).refinements;
+    write_text_file(fs::path(options.report) / "calibration.html", lab::to_html(page));
+  }
   return judged.refinements.empty() ? unusable_input : done;
 }
 
@@ -164,6 +193,7 @@ void add_calibrate(CLI::App& program, Action& chosen) {
   CLI::App* verb = program.add_subcommand("calibrate", "measure mounts, focal length and clocks from a recording");
   add_common(*verb, *options);
   verb->add_option("--out", options->write, "the configuration with what was significantly off put right")->type_name("FILE")->required();
+  verb->add_option("--report", options->report, "write a page with each value before and after: DIR/calibration.html")->type_name("DIR");
   verb->callback([options, &chosen] { chosen = [options] { return calibrate(*options); }; });
 }
 

@@ -55,13 +55,6 @@ Measured measured(const WrongDescription& first, const RunOptions& options, cons
   return {std::move(findings), examination.refinements()};
 }
 
-void put(std::vector<lab::Change>& settings, const std::vector<lab::Change>& changes) {
-  for (const lab::Change& c : changes) {
-    std::erase_if(settings, [&c](const lab::Change& before) { return before.key == c.key; });
-    settings.push_back(c);
-  }
-}
-
 }  // namespace
 
 KnownDescription next_round(KnownDescription known, const std::vector<WrongDescription>& found, const RunOptions& options,
@@ -75,11 +68,11 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
       again.push_back(lab::as_wrong(f, first.t, first.after));
     if (std::ranges::any_of(again, [&](const WrongDescription& w) { return known.stops(w); })) wrong = again;
     for (const WrongDescription& w : wrong) {
-      if (known.stops(w)) put(known.mended, w.finding.changes);
+      if (known.stops(w)) lab::put(known.mended, w.finding.changes);
     }
     if (!known.mended.empty()) {
       for (const lab::Refinement& r : measured(first, options, mended(known, options, config), used).refinements) {
-        if (r.significant) put(known.mended, r.changes);
+        if (r.significant) lab::put(known.mended, r.changes);
       }
     }
   } else {

@@ -26,6 +26,14 @@ struct Finding {
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  // rad, IMU frame: a mount that is wrong by a rotation
 };
 
+/// Adds `later`, which hold where both have a key.
+inline void put(std::vector<Change>& changes, const std::vector<Change>& later) {
+  for (const Change& c : later) {
+    std::erase_if(changes, [&c](const Change& before) { return before.key == c.key; });
+    changes.push_back(c);
+  }
+}
+
 /// Something that was looked at.
 struct Check {
   enum class Verdict { good, note, wrong, unknown };

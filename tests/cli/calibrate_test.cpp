@@ -1,0 +1,85 @@
+// kilvo calibrate: a description that is a little off, or much, becomes the right one.
+#include <Eigen/Geometry>
+#include <cmath>
+#include <fmt/core.h>
+
+#include "lab/settings/settings.hpp"
+#include "tests/cli/story.hpp"
+
+namespace kilvo::stories {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class Calibrate : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(kilvo({"simulate", "room", "--duration", "25", "--sensors", "imu,legs,lidar", "--out", walk_, "--quiet"}).code, 0);
+  }
+
+  Finished calibrate(const std::vector<std::string>& wrong) const {
+    std::vector<std::string> words{"calibrate", walk_, "--config", walk_ + "/config.yaml", "--out", better_, "--report", report_};
+    for (const std::string& setting : wrong) words.insert(words.end(), {"--set", setting});
+    return kilvo(words);
+  }
+  static Eigen::Matrix3d turned_by(double degrees) {
+    return Eigen::AngleAxisd(degrees * 0.01745329251994, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  }
+  static LidarMount lidar(const std::string& config) { return lab::load_settings(config, {}).robot.lidar; }
+  static Eigen::Matrix3d mount(const std::string& config) { return lidar(config).T_imu_lidar.R.matrix(); }
+  std::string wrong_by(double degrees) const {
+    const Eigen::Matrix3d R = turned_by(degrees) * mount(walk_ + "/config.yaml");
+    std::string out = "lidar.T_imu_lidar.R=[";
+    for (int i = 0; i < 9; ++i) out += fmt::format("{}{}", i > 0 ? ", " : "", R(i / 3, i % 3));
+    return out + "]";
+  }
+  // degrees
+  double left() const { return Eigen::AngleAxisd(mount(better_) * mount(walk_ + "/config.yaml").transpose()).angle() * 57.29577951308; }
+
+  TemporaryFolder folder_;
+  std::string walk_ = folder_ / "walk", better_ = folder_ / "better.yaml", report_ = folder_ / "report";
+};
+
+TEST_F(Calibrate, MeasuresWhatIsALittleOff) {
+  const Finished f = calibrate({wrong_by(0.5)});
+  ASSERT_EQ(f.code, 0) << f.err;
+  EXPECT_THAT(f.out, AllOf(HasSubstr("rotation of the LiDAR on the IMU"), HasSubstr("deg, standard deviation"), HasSubstr("changed")));
+  EXPECT_LT(left(), 0.15);
+  const std::string page = read_text(report_ + "/calibration.html");
+  EXPECT_THAT(
+      page, AllOf(HasSubstr("rotation of the LiDAR on the IMU"), HasSubstr("class=\"changed\""), HasSubstr("<svg"), HasSubstr("</html>")));
+  EXPECT_THAT(page, testing::Not(HasSubstr("Mended first")));
+}
+
+TEST_F(Calibrate, MendsWhatIsMuchOffFirst) {
+  const Finished f = calibrate({wrong_by(20), "lidar.time_offset=0.02"});
+  ASSERT_EQ(f.code, 0) << f.err;
+  EXPECT_THAT(f.err,
+              AllOf(HasSubstr("calibrate: the LiDAR is turned against its description"), HasSubstr("mended by lidar.T_imu_lidar.R: [")));
+  EXPECT_LT(left(), 0.15);
+  EXPECT_NEAR(lidar(better_).time_offset, 0, 0.001);
+  EXPECT_THAT(read_text(report_ + "/calibration.html"), HasSubstr("Mended first"));
+}
+
+TEST_F(Calibrate, ChangesNothingThatIsRight) {
+  const Finished f = calibrate({});
+  ASSERT_EQ(f.code, 0) << f.err;
+  EXPECT_THAT(f.err, HasSubstr("better.yaml with 0 settings changed"));
+}
+
+TEST_F(Calibrate, RefusesWhatNoSettingMends) {
+  // The left knee turns the other way round than its URDF says.
+  std::string urdf = read_text(walk_ + "/robot.urdf");
+  const std::size_t joint = urdf.find("<joint name=\"left_knee_joint\""), axis = urdf.find("xyz=\"0 1 0\"", urdf.find("<axis", joint));
+  ASSERT_NE(axis, std::string::npos);
+  urdf.replace(axis, 11, "xyz=\"0 -1 0\"");
+  write_text(folder_ / "turned.urdf", urdf);
+  const Finished f = calibrate({"robot.urdf=" + std::string(folder_ / "turned.urdf")});
+  EXPECT_EQ(f.code, 1);
+  EXPECT_THAT(f.err, HasSubstr("no setting mends it"));
+  EXPECT_THAT(f.out, HasSubstr("left_knee_joint"));
+}
+
+}  // namespace
+}  // namespace kilvo::stories
