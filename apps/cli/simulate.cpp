@@ -31,6 +31,11 @@ void add_simulate(CLI::App& program, Action& chosen) {
   verb->add_option("--sensors", options->sensors, "record only these of legs,imu,lidar,camera, which are as without it; default: all")
       ->type_name("LIST");
   verb->add_option("--stride", options->stride, "every step so many times as long; default: 1")->type_name("X");
+  verb->add_option("--lidar-points", options->lidar_points, "of a sweep")->type_name("N")->check(CLI::Range(500, 500'000));
+  verb->add_option("--lidar-rate", options->lidar_rate, "of the sweeps")->type_name("HZ")->check(CLI::Range(1.0, 50.0));
+  verb->add_option("--image-width", options->image_width, "of the images, with the same field of view")
+      ->type_name("PIXELS")
+      ->check(CLI::Range(160, 3840));
   add_wear_options(*verb, options->wear);
   verb->add_option("--rough", options->rough, "a robot as it is, kept well (1) or badly (2); the description is the nominal one")
       ->type_name("LEVEL")

@@ -106,6 +106,17 @@ lab::RoughParts parts_of(const SimulationOptions& options) {
   }
 }
 
+void resize(lab::SimulatorConfig& config, const SimulationOptions& options) {
+  config.lidar.points = options.lidar_points.value_or(config.lidar.points);
+  config.lidar.delivery.rate = options.lidar_rate.value_or(config.lidar.delivery.rate);
+  lab::CameraModel& camera = config.camera;
+  const int width = options.image_width.value_or(camera.width), height = width * camera.height / camera.width;
+  const double factor = static_cast<double>(width) / camera.width;
+  camera.width = width;
+  camera.height = height;
+  for (double* size : {&camera.fx, &camera.fy, &camera.cx, &camera.cy, &camera.blur}) *size *= factor;
+}
+
 /// The robot, what its user knows of it, and the seed and the end of its walk.
 lab::RoughRobot robot_of(const lab::Scenario& scenario, const SimulationOptions& options) {
   lab::SimulatorConfig config = lab::robot_of(scenario);
@@ -116,6 +127,7 @@ lab::RoughRobot robot_of(const lab::Scenario& scenario, const SimulationOptions&
     config.use.fill(false);
     for (const Sensor sensor : parse_sensors(options.sensors)) config.use[static_cast<std::size_t>(sensor)] = true;
   }
+  resize(config, options);
   lab::RoughRobot robot = lab::rough_robot(config, options.rough, parts_of(options));
   apply(options.wear, robot.truth);
   apply(options.wear, robot.known);

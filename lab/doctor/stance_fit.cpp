@@ -48,8 +48,8 @@ Eigen::Vector3d middle_of(const FootPose& foot) {
 
 class Stances {
  public:
-  Stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
-          double offset, bool with_zeros)
+  Stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro, double offset,
+          bool with_zeros)
       : way_(way), gyro_(gyro), T_LI_(robot.imu.T_link_imu), offset_(offset) {
     if (with_zeros) joints_ = legs.joints_that_matter(robot);
     const std::vector<LegPose> path = legs.path(robot, hypothesis, sample_period, nullptr);
@@ -195,8 +195,8 @@ class Stances {
 
 }  // namespace
 
-StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
-                      const GyroPath& gyro, double offset) {
+StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
+                      double offset) {
   StanceFit out;
   Stances stances(legs, robot, hypothesis, way, gyro, offset, true);
   const Eigen::Index n = stances.unknowns();
@@ -235,8 +235,8 @@ StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesi
   return out;
 }
 
-Standing standing_time(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
-                       const GyroPath& gyro, double offset) {
+Standing standing_time(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
+                       double offset) {
   return Stances(legs, robot, hypothesis, way, gyro, offset, false).standing();
 }
 

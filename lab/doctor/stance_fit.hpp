@@ -26,8 +26,8 @@ struct StanceFit {
 };
 
 /// `hypothesis`: of the legs, may be null. Starts from robot.imu.T_link_imu and `offset`.
-StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
-                      const GyroPath& gyro, double offset);
+StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
+                      double offset);
 
 struct Standing {
   std::array<double, 2> of{};  // s, by foot, in which its sole stands while the robot moves
@@ -38,8 +38,8 @@ struct Standing {
 };
 
 /// Legs that are described wrongly hardly ever stand.
-Standing standing_time(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
-                       const GyroPath& gyro, double offset);
+Standing standing_time(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
+                       double offset);
 
 struct LegStart {
   double offset = 0;  // s: the legs' stamps plus this are on the IMU's clock

@@ -146,6 +146,7 @@ std::vector<Scenario> of_the_room() {
        {-0.5, 0, 0},
        {still, turn(24, 4 * quarter), stand(0.5), turn(24, -4 * quarter), rest}},
       named_also("square_walk", {"square", "two rounds of a rectangle", "room", room_corner, square(2, {}, 0.27)}),
+      {"hour", "a rectangle again and again, for an hour", "room", room_corner, square(121, {}, 0.27)},
       {"lifts", "one foot is held up after the other", "room", {-0.5, 0, 0}, {still, ahead(12, 0, lifting()), rest}},
       {"fast_walk", "long quick steps round a room", "room", room_corner, square(2, fast(), 0.32)},
       {"rolling", "soles that come down on the heel and leave over the toe", "room", room_corner, square(1, rolling(), 0.3)},

@@ -260,6 +260,20 @@ TEST(Simulate, WearThatIsNoNumberIsRefused) {
   }
 }
 
+TEST(Simulate, SweepsAndImagesAreOfTheSizeThatIsAskedFor) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(kilvo({"simulate", "room", "--out", folder / "sim", "--duration", "2", "--sensors", "imu,lidar,camera", "--lidar-points",
+                   "3000", "--lidar-rate", "20", "--image-width", "320", "--quiet"})
+                .code,
+            0);
+  const Finished info = kilvo({"info", folder / "sim"});
+  EXPECT_THAT(info.out, AllOf(HasSubstr("sensor_msgs/PointCloud2        40     20.00"), HasSubstr("320x240 colour")));
+  const std::string config = read_text(folder / "sim/config.yaml");
+  EXPECT_THAT(config, AllOf(HasSubstr("width: 320"), HasSubstr("height: 240"), HasSubstr("fx: 170.65"), HasSubstr("rate: 20")));
+  // 3000 points of 26 bytes, of which those beyond the range are missing.
+  EXPECT_LT(std::filesystem::file_size(folder / "sim/recording.bag"), 40U * 3000 * 32 + 20U * 320 * 240 * 3 + 400'000);
+}
+
 TEST(Simulate, HelpListsTheScenarios) {
   const Finished f = kilvo({"simulate", "--help"});
   EXPECT_EQ(f.code, 0);
