@@ -1,7 +1,5 @@
 #include "apps/cli/run_summary.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <fmt/core.h>
 
 namespace kilvo::cli {
@@ -14,30 +12,24 @@ constexpr Duration path_period = std::chrono::milliseconds(100);
 }  // namespace
 
 void StageClock::add(std::string_view stage, double microseconds) {
-  auto found = times_.find(stage);
-  if (found == times_.end()) found = times_.emplace(std::string(stage), std::vector<float>()).first;
-  found->second.push_back(static_cast<float>(microseconds));
+  auto found = stages_.find(stage);
+  if (found == stages_.end()) found = stages_.emplace(std::string(stage), Stage{}).first;
+  found->second.latency.add(1e-6 * microseconds);
+  found->second.sum += 1e-6 * microseconds;
 }
 
 std::map<std::string, Quantiles> StageClock::quantiles() const {
   std::map<std::string, Quantiles> out;
-  for (const auto& [stage, times] : times_) {
-    std::vector<float> sorted = times;
-    std::ranges::sort(sorted);
-    const auto at = [&sorted](double share) {
-      return sorted[static_cast<std::size_t>(std::ceil(share * static_cast<double>(sorted.size()))) - 1];
-    };
-    out[stage] = {at(0.5), at(0.99), sorted.back(), sorted.size()};
+  for (const auto& [name, stage] : stages_) {
+    const live::Latency& of = stage.latency;
+    out[name] = {1e6 * of.quantile(0.5), 1e6 * of.quantile(0.99), 1e6 * of.max(), of.count()};
   }
   return out;
 }
 
 double StageClock::total() const {
   double sum = 0;
-  for (const auto& [stage, times] : times_) {
-    if (stage == "contact") continue;
-    for (const float t : times) sum += static_cast<double>(t);
-  }
+  for (const auto& [name, stage] : stages_) sum += name == "contact" ? 0 : 1e6 * stage.sum;
   return sum;
 }
 

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Wrong descriptions of a robot that `kilvo doctor` must find, and how often it names the right culprit.
 
-  confusion.py KILVO RECORDING CONFIG [--only TEXT] [--work DIR] [--data]
+  confusion.py KILVO RECORDING CONFIG [--only TEXT] [--data] [--until S]
 
 Each case changes the right configuration (or, with --data, the messages: needs python3-rosbag) in one place, runs `kilvo doctor --json`
 and compares the findings with what was done. Exit status 1 when a culprit is not named, another one is, or the right description is

@@ -267,7 +267,7 @@ TEST(Simulate, SweepsAndImagesAreOfTheSizeThatIsAskedFor) {
                 .code,
             0);
   const Finished info = kilvo({"info", folder / "sim"});
-  EXPECT_THAT(info.out, AllOf(HasSubstr("sensor_msgs/PointCloud2        40     20.00"), HasSubstr("320x240 colour")));
+  EXPECT_THAT(info.out, AllOf(HasSubstr("sensor_msgs/PointCloud2         40     20.00"), HasSubstr("320x240 colour")));
   const std::string config = read_text(folder / "sim/config.yaml");
   EXPECT_THAT(config, AllOf(HasSubstr("width: 320"), HasSubstr("height: 240"), HasSubstr("fx: 170.65"), HasSubstr("rate: 20")));
   // 3000 points of 26 bytes, of which those beyond the range are missing.
