@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
+#include <span>
 
 #include "lab/doctor/examination.hpp"
 
@@ -14,7 +15,7 @@ constexpr double worth_a_note = 0.08;             // degrees
 constexpr double lidar_clock_tolerance = 0.0035;  // s
 constexpr double believable = 0.2;                // m/s, that the acceleration and the way may be apart by
 
-double mean_thickness(const std::vector<SweepPose>& way) {
+double mean_thickness(std::span<const SweepPose> way) {
   double sum = 0, n = 0;
   for (const SweepPose& p : way) {
     if (!p.good || p.thickness == 0) continue;
@@ -96,8 +97,11 @@ void Examination::examine_point_times() {
   const SO3 start = SO3::nearest(lidar_.error * robot_.lidar.T_imu_lidar.R.matrix());
   const MountFit first = fit_mount(lidar_turns_, path, start, lidar_.offset);
   Deskew deskew{&path, first.fit.good ? first.R : start, first.fit.good ? first.offset : lidar_.offset, false};
-  if (!point_times_are_good_) deskew.reversed = point_times_run_backwards(deskew);
   way_ = scan_odometry(recorded_.sweeps, deskew);
+  if (!point_times_are_good_ && point_times_run_backwards(deskew)) {
+    deskew.reversed = true;
+    way_ = scan_odometry(recorded_.sweeps, deskew);
+  }
   // Once more with the mount and the clock that follow: sweeps taken as rigid shift both a little.
   const MountFit again = fit_mount(turns_of(way_), path, deskew.R_IL, deskew.offset);
   if (!again.fit.good) return;
@@ -136,6 +140,16 @@ bool Examination::point_times_run_backwards(Deskew deskew) {
     most = sums[i + stretch] - sums[i];
     best = i;
   }
+  constexpr double clearly = 0.9;
+  const auto thickness = [&](const std::vector<SweepPose>& way) {
+    return mean_thickness(std::span(way).subspan(best, std::min(stretch, way.size() - best)));
+  };
+  // Times that help would not help the other way round.
+  if (const double with = thickness(way_), without = thickness(rigid_); with < clearly * without) {
+    check(Sensor::lidar, "point times", Check::Verdict::good,
+          fmt::format("surfaces are {:.1f} mm thick with the points' times, {:.1f} mm without", 1e3 * with, 1e3 * without));
+    return false;
+  }
   const OdometryRange range{best, best + stretch};
   const double forward = mean_thickness(scan_odometry(recorded_.sweeps, deskew, range));
   deskew.reversed = true;
@@ -144,7 +158,6 @@ bool Examination::point_times_run_backwards(Deskew deskew) {
   const std::string evidence =
       fmt::format("surfaces are {:.1f} mm thick with the points' times, {:.1f} mm with reversed ones, {:.1f} mm without", 1e3 * forward,
                   1e3 * backward, 1e3 * rigid);
-  constexpr double clearly = 0.9;
   if (backward < clearly * forward && backward < rigid) {
     find({Sensor::lidar,
           "point_times_reversed",
