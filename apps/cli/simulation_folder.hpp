@@ -20,7 +20,7 @@ struct SimulationOptions {
   int rough = 0;                   // level of lab::rough_robot(); 0: the robot is as it is described
   std::string rough_only{};        // parts of that, with commas between; empty: all
   std::string sensors{};           // that are recorded, with commas between; empty: all
-  // Other than the scenario has them; of a rough robot too.
+  // In place of the scenario's.
   std::optional<int> lidar_points{}, image_width{};  // of a sweep; pixels, with the same field of view
   std::optional<double> lidar_rate{};                // Hz
 };

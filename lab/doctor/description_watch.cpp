@@ -90,14 +90,14 @@ void DescriptionWatch::judge(Time t) {
   collect();
   if (over_) return;
   if (first_ || moved()) {
-    const auto work = [robot = robot_, recorder = recorder_, t, good = point_times_are_good_]() mutable {
+    auto work = [robot = robot_, recorder = recorder_, t, good = point_times_are_good_]() mutable {
       const Recorded recorded = recorder.finish();
       const Diagnosis diagnosis = diagnosis_of(recorded, robot, good);
       const auto times = std::ranges::find(diagnosis.checks, "point times", &Check::what);
       return Verdict{diagnosis.findings, diagnosis.settled,
                      good || (times != diagnosis.checks.end() && times->verdict == Check::Verdict::good), t};
     };
-    future_ = std::async(judging_ == Judging::here ? std::launch::deferred : std::launch::async, work);
+    future_ = std::async(judging_ == Judging::here ? std::launch::deferred : std::launch::async, std::move(work));
     if (judging_ == Judging::here) collect();
   }
   if (++due_ < dues.size()) return;

@@ -61,7 +61,7 @@ class DescriptionWatch {
   bool first_ = true;    // window: judged even when the robot stands, for units and rates
   int windows_ = 0;      // in which the robot moved
   bool point_times_are_good_ = false;
-  double turned_ = 0;    // rad, by the gyro in this window
+  double turned_ = 0;  // rad, by the gyro in this window
   std::optional<Time> last_imu_;
   std::future<Verdict> future_;
   std::vector<WrongDescription> found_;

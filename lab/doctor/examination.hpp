@@ -127,7 +127,7 @@ class Examination {
   void find_rotation(Finding finding, const SO3& before, const SO3& after, const std::string& key);
 
   const Recorded& recorded_;
-  mutable RecordedLegs recorded_legs_{recorded_};
+  mutable RecordedLegs recorded_legs_{recorded_};  // keeps the URDFs that it has read
   Robot robot_, original_;
   Eigen::Matrix3d gyro_axes_ = Eigen::Matrix3d::Identity();  // take what was written to rad/s and m/s^2 in the IMU frame
   Eigen::Matrix3d accel_axes_ = Eigen::Matrix3d::Identity();

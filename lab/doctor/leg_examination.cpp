@@ -13,6 +13,7 @@ namespace kilvo::lab {
 namespace {
 
 constexpr double least_explained = 0.5;
+constexpr std::size_t calm_poses = 6;     // of which one is looked at: neighbours say the same
 constexpr double much_better_legs = 0.6;  // of the cost that a hypothesis may leave
 
 // Normal of a sole, towards the link that stands on it.
@@ -73,7 +74,7 @@ Examination::LegScore Examination::score_legs(const std::vector<LegPose>& path, 
   for (const LegPose& pose : path) {
     const double t = pose.t + offset;
     if (!gyro_path.covers(t - 0.1, t + 0.1) || gyro_path.rate(t - 0.1, t + 0.1).norm() > 0.05) continue;
-    if (k++ % 6 != 0) continue;
+    if (k++ % calm_poses != 0) continue;
     const Eigen::Vector3d left = normal_of(pose.foot[0]), right = normal_of(pose.foot[1]);
     if (left.isZero() || right.isZero()) continue;
     angles.push_back(angle_between(left, right));
