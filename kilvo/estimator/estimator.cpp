@@ -88,7 +88,7 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   // On the move the first sweeps find the velocity, and the legs tell it within a step.
   constexpr Duration to_settle = std::chrono::seconds(2), a_step = std::chrono::seconds(1);
   if (vision_) vision_->begin_at(start.still ? t : t + to_settle);
-  lidar_.begin_at(start.still || !input_.uses(Sensor::legs) ? t : t + a_step);
+  lidar_.begin_at(start.still || !input_.uses(Sensor::legs) ? t : t + a_step, start.estimate.x.pose());
   if (!start.still) findings_.report(situation(), {}, Reason::moving_start);
   const double norm = start.resting_norm * start.accel_scale;
   if (std::abs(norm - standard_gravity) > 0.1 * standard_gravity)
@@ -183,7 +183,7 @@ void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<
   o->epoch = epoch();
   o->x = e.x;
   o->P = e.P;
-  o->P.topLeftCorner<6, 6>() += map_.error_at(e.x.pose());
+  o->P.topLeftCorner<6, 6>() += shared_error_at(e.x.pose());
   if (history_.replay().has_imu()) o->omega = history_.replay().newest_imu().gyro - e.x.bg;
   o->modality = status_.modality();
   o->cause = status_.cause();
@@ -196,7 +196,7 @@ void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<
 
 bool Estimator::fork(LivePropagator& into) const {
   if (!history_.has_begun() || !history_.replay().has_imu()) return false;
-  into.become(history_, legs_, imu_, status_, map_.error_at(history_.now().x.pose()), epoch());
+  into.become(history_, legs_, imu_, status_, shared_error_at(history_.now().x.pose()), epoch());
   return true;
 }
 

@@ -61,7 +61,7 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
 
   const SE3 T_WI = history_.now().x.pose();
   if (good) {
-    const auto clock = lidar_.check_clock(prior, sweep.posterior, history_.trajectory(), begin, end, least_offset);
+    const auto clock = lidar_.compare_turns(prior, sweep.posterior, history_.trajectory(), begin, end, least_offset);
     if (clock.doubtful && vision_) vision_->restart_mount_check();  // it may see nothing but this
     if (clock.offset)
       findings_.report_clock_offset(situation(), Sensor::lidar, input_.shift_by(Sensor::lidar, *clock.offset), robot_.lidar.time_offset);

@@ -156,10 +156,14 @@ bool LidarPipeline::refuse(Time t, bool map_is_given) {
 
 void LidarPipeline::rejoin() { sweeps_to_go_ = consistent_sweeps; }
 
-LidarPipeline::ClockEvidence LidarPipeline::check_clock(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory,
-                                                        Time begin, Time end, double least) {
+LidarPipeline::ClockEvidence LidarPipeline::compare_turns(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory,
+                                                          Time begin, Time end, double least) {
   const auto first = trajectory.at(begin), last = trajectory.at(end);
-  if (!first || !last || end <= begin || is_blind_somewhere() || is_rejoining()) return {};
+  if (!first || !last || end <= begin || is_blind_somewhere() || is_rejoining()) {
+    mount_error_.restart();
+    return {};
+  }
+  mount_error_.add(prior.t, posterior.x.R, trajectory);
   const Eigen::Vector3d rate = (first->R.inverse() * last->R).Log() / to_seconds(end - begin);
   time_offset_.add((prior.x.R.inverse() * posterior.x.R).Log(), rate);
   const ClockEvidence out = {time_offset_.is_doubtful(), time_offset_.offset(least)};

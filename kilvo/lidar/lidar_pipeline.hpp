@@ -8,6 +8,7 @@
 #include "kilvo/filter/predict.hpp"
 #include "kilvo/filter/trajectory.hpp"
 #include "kilvo/filter/update_config.hpp"
+#include "kilvo/lidar/mount_error.hpp"
 #include "kilvo/lidar/point_to_plane.hpp"
 #include "kilvo/lidar/time_offset.hpp"
 #include "kilvo/lidar/undistort.hpp"
@@ -38,9 +39,12 @@ class LidarPipeline {
  public:
   LidarPipeline(const LidarMount& mount, const LidarConfig& config, const UpdateConfig& update, const ProcessNoise& noise, int threads);
 
-  /// Sweeps that end before `t` are used only when the velocity is known: one of an unknown velocity has no shape, and along a corridor
-  /// nothing would show it.
-  void begin_at(Time t) { begins_at_ = t; }
+  /// The first pose is T_WI. Sweeps that end before `t` are used only when the velocity is known: one of an unknown velocity has no shape,
+  /// and along a corridor nothing would show it.
+  void begin_at(Time t, const SE3& T_WI) {
+    begins_at_ = t;
+    mount_error_.begin_at(T_WI);
+  }
   bool has_shape(Time end, const Estimate& prior) const;
 
   /// A sweep begins so long after the last one that was used.
@@ -63,14 +67,16 @@ class LidarPipeline {
   void rejoin();
   bool is_rejoining() const { return sweeps_to_go_ > 0; }
 
-  /// What the sweeps say of the LiDAR's clock.
+  /// What the sweeps' turning against the gyro's says of the LiDAR's clock.
   struct ClockEvidence {
     bool doubtful = false;         // it may be off: nothing that goes with it is to be judged
     std::optional<double> offset;  // s, to be added to the stamps from now on
   };
   /// Before accept(): a sweep from `begin` to `end` turned the state from `prior` to `posterior`. An offset of less than `least` s is none.
-  ClockEvidence check_clock(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory, Time begin, Time end,
-                            double least);
+  ClockEvidence compare_turns(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory, Time begin, Time end,
+                              double least);
+  /// Covariance of a pose there from a mount that is not quite as described, see MountError.
+  PoseCovariance mount_error_at(const SE3& T_WI) const { return mount_error_.at(T_WI); }
 
   /// Takes a pose error to its part along what the last sweep did not know.
   const PoseCovariance& unobservable() const { return unobservable_; }
@@ -87,6 +93,7 @@ class LidarPipeline {
   Workers workers_;
   Time begins_at_{};
   TimeOffset time_offset_;
+  MountError mount_error_;
   PoseCovariance unobservable_ = PoseCovariance::Zero();
   int sweeps_to_go_ = 0;               // consistent sweeps before the map grows again
   std::optional<Time> refused_since_;  // sweeps that fit nowhere
