@@ -34,7 +34,7 @@ std::vector<WrongDescription> that_stopped(const KnownDescription& known, const 
 }
 
 struct Measured {
-  std::vector<lab::Finding> findings;
+  lab::Diagnosis diagnosis;
   std::vector<lab::Refinement> refinements;
 };
 
@@ -51,8 +51,8 @@ Measured measured(const WrongDescription& first, const RunOptions& options, cons
   }
   const lab::Recorded recorded = recorder.finish();
   lab::Examination examination(recorded, settings.robot);
-  std::vector<lab::Finding> findings = examination.run().findings;
-  return {std::move(findings), examination.refinements()};
+  lab::Diagnosis diagnosis = examination.run();
+  return {std::move(diagnosis), examination.refinements()};
 }
 
 }  // namespace
@@ -63,10 +63,11 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
   if (known.round == 1) {
     const WrongDescription first = wrong.front();
     // The same on more data, which measure what is wrong more precisely; and what is still off once that is mended.
+    const lab::Diagnosis longer = measured(first, options, mended(known, options, config), used).diagnosis;
     std::vector<WrongDescription> again;
-    for (const lab::Finding& f : measured(first, options, mended(known, options, config), used).findings)
-      again.push_back(lab::as_wrong(f, first.t, first.after));
+    for (const lab::Finding& f : longer.findings) again.push_back(lab::as_wrong(f, first.t, first.after));
     if (std::ranges::any_of(again, [&](const WrongDescription& w) { return known.stops(w); })) wrong = again;
+    if (longer.is_right()) std::ranges::for_each(wrong, lab::refute);
     for (const WrongDescription& w : wrong) {
       if (known.stops(w)) lab::put(known.mended, w.finding.changes);
     }
@@ -103,6 +104,7 @@ std::vector<Sensor> sound(const std::vector<Sensor>& used, const KnownDescriptio
 std::string consequence(const KnownDescription& known, const std::vector<Sensor>& used, const std::vector<Sensor>& left) {
   if (known.round == 1) return "";
   if (left.empty()) return "; nothing is left to estimate with";
+  if (known.mended.empty() && left == used) return "";
   std::vector<std::string_view> keys, names;
   for (const lab::Change& change : known.mended) keys.push_back(change.key);
   for (const Sensor sensor : left) names.push_back(name_of(sensor));

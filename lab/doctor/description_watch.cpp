@@ -52,6 +52,12 @@ WrongDescription as_wrong(const Finding& finding, Time t, double after) {
   return {finding, t, after, spoils(finding), is_mendable(finding)};
 }
 
+void refute(WrongDescription& wrong) {
+  wrong.spoils = wrong.is_mendable = false;
+  wrong.finding.text += "; more of the data does not show it, and the description is used as it is";
+  wrong.finding.changes.clear();
+}
+
 void DescriptionWatch::take(const Measurement& measurement) {
   const Sensor sensor = sensor_of(measurement);
   if (sensor == Sensor::camera) return;

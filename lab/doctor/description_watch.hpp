@@ -22,6 +22,8 @@ struct WrongDescription {
 
 /// What the finding means for a run.
 WrongDescription as_wrong(const Finding& finding, Time t, double after);
+/// More data show the description to be right: what is left is a warning, and nothing is to be changed.
+void refute(WrongDescription& wrong);
 
 class DescriptionWatch {
  public:

@@ -182,6 +182,18 @@ TEST(DescriptionWatch, DoesNotAccuseAClockThatTheProgramFinds) {
   EXPECT_TRUE(watched(walked().robot, true, DescriptionWatch::Judging::here, jumps).empty());
 }
 
+TEST(DescriptionWatch, WhatMoreDataRefuteIsAWarningAndChangesNothing) {
+  Finding finding;
+  finding.cause = "lidar_rotation";
+  finding.size = 5;
+  finding.changes = {{"lidar.T_imu_lidar.R", "[1, 0, 0, 0, 1, 0, 0, 0, 1]"}};
+  WrongDescription wrong = as_wrong(finding, {}, 9);
+  ASSERT_TRUE(wrong.spoils && wrong.is_mendable);
+  refute(wrong);
+  EXPECT_FALSE(wrong.spoils || wrong.is_mendable || !wrong.finding.changes.empty());
+  EXPECT_THAT(wrong.finding.text, testing::HasSubstr("the description is used as it is"));
+}
+
 TEST(Doctor, WhoStandsStillIsNotJudged) {
   Recorded recorded = walked().recorded;
   std::erase_if(recorded.imu, [](const InertialSample& s) { return s.t > 3; });
