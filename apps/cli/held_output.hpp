@@ -1,4 +1,5 @@
 // What the files of a run need of an output, in a fifth of its size: outputs wait until the world is level.
+// Of a live runner states and sweeps come apart.
 #pragma once
 
 #include "kilvo/estimator/output.hpp"
@@ -7,9 +8,13 @@ namespace kilvo::cli {
 
 class HeldOutput {
  public:
-  explicit HeldOutput(Output&& o)
-      : t_(o.t),
+  enum class Part : std::uint8_t { whole, state, sweep };
+
+  HeldOutput(const Output& o, Part part)
+      : part_(part),
+        t_(o.t),
         x_(o.x),
+        R_LW_(o.R_LW),
         omega_(o.omega),
         pose_P_(o.P.topLeftCorner<6, 6>()),
         modality_(o.modality),
@@ -20,14 +25,16 @@ class HeldOutput {
         kinematic_us_(o.kinematic_us),
         contact_us_(o.contact_us),
         stages_(o.stages),
-        indicators_(std::move(o.indicators)),
-        events_(std::move(o.events)) {}
+        indicators_(o.indicators),
+        events_(o.events) {}
 
+  Part part() const { return part_; }
   /// The output again, without clouds, report and what its covariance said beyond the pose.
   Output output() const {
     Output o;
     o.t = t_;
     o.x = x_;
+    o.R_LW = R_LW_;
     o.omega = omega_;
     o.P.topLeftCorner<6, 6>() = pose_P_;
     o.modality = modality_;
@@ -44,8 +51,10 @@ class HeldOutput {
   }
 
  private:
+  Part part_;
   Time t_;
   State x_;
+  std::optional<SO3> R_LW_;
   Eigen::Vector3d omega_;
   Eigen::Matrix<double, 6, 6> pose_P_;
   Modality modality_;

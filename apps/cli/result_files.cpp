@@ -29,11 +29,6 @@ ResultFiles::ResultFiles(const std::filesystem::path& folder, double smooth_time
       folder_(folder),
       smoothing_(smooth_time) {}
 
-void ResultFiles::write(const Output& output) {
-  write_state(output);
-  write_sweep(output);
-}
-
 void ResultFiles::write_state(const Output& output) {
   odometry_.write({output.t, output.x.pose()});
   smooth_.write({output.t, smoothing_.add(output)});

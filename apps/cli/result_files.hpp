@@ -17,9 +17,7 @@ class ResultFiles {
   /// Throws lab::OutputError or lab::TrajectoryOutputError, as do write() and close().
   ResultFiles(const std::filesystem::path& folder, double smooth_time);
 
-  /// Of an estimator: everything that it says.
-  void write(const Output& output);
-  /// Of a live runner, whose states and sweeps come apart.
+  /// What every output says, and what only sweeps, images and those with events say: of a live runner they come apart.
   void write_state(const Output& output);
   void write_sweep(const Output& output);
   void write_events(const std::vector<Event>& events);

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "apps/cli/exit_code.hpp"
-#include "apps/cli/held_output.hpp"
 #include "apps/cli/interrupt.hpp"
 #include "apps/cli/known_description.hpp"
+#include "apps/cli/level_files.hpp"
 #include "apps/cli/make_estimator.hpp"
 #include "apps/cli/map_keeper.hpp"
 #include "apps/cli/output_folder.hpp"
@@ -25,7 +25,6 @@
 #include "apps/cli/summary.hpp"
 #include "apps/live/live_runner.hpp"
 #include "kilvo/estimator/estimator.hpp"
-#include "kilvo/estimator/levelling.hpp"
 #include "lab/doctor/description_watch.hpp"
 #include "lab/mapping/ply.hpp"
 #include "lab/run_log/run_log.hpp"
@@ -59,6 +58,7 @@ class Run {
         estimator_(make_estimator(settings_, read())),
         map_(settings_.mapping, options.threads > 1 || options.realtime),
         files_(options.out, settings_.estimator.smooth_time),
+        level_(files_, settings_.estimator.gravity_align),
         log_(options.mcap ? std::make_unique<lab::RunLog>(options.out / "run.mcap",
                                                           std::array{settings_.robot.feet[0].name, settings_.robot.feet[1].name})
                           : nullptr),
@@ -74,6 +74,7 @@ class Run {
   std::optional<int> all() {
     const bool interrupted = options_.realtime ? replay_live() : !facts_.sensors.empty() && replay();
     progress_.finish();
+    if (!stopped_) level_.finish();
     if (known_.is_judged() && !stopped_ && !interrupted) wrong_ = description_.finish();
     if (!options_.realtime && std::ranges::any_of(wrong_, [this](const auto& wrong) { return known_.stops(wrong); })) return std::nullopt;
     files_.write_events(estimator_.take_events());
@@ -84,10 +85,11 @@ class Run {
     skeleton_.close();
     for (const Sensor sensor : facts_.sensors) facts_.withheld[static_cast<std::size_t>(sensor)] = failing_.dropped(sensor);
     const lab::MapBuilder& map = map_.finish();
-    if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map, levelling_.turn().value_or(SO3()));
+    if (options_.with_map) lab::write_ply(options_.map.value_or(options_.out / "map.ply"), map, level_.turn().value_or(SO3()));
     facts_.map_points = map.size();
     facts_.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - facts_.begin).count();
-    write_text_file(options_.out / "summary.json", summary_json(facts_, settings_, source_, estimator_.statistics(), files_.run_summary()));
+    write_text_file(options_.out / "summary.json",
+                    summary_json(facts_, settings_, source_, estimator_.statistics(), level_.event(), files_.run_summary()));
     tell_end();
     return facts_.failure.empty() ? done : run_failed;
   }
@@ -141,8 +143,6 @@ class Run {
     input.stop();
     if (stopped_) return false;
     keep(estimator_.finish());
-    levelling_.finish();
-    write_waiting();
     return interrupted;
   }
 
@@ -150,13 +150,13 @@ class Run {
     live::LiveRunner runner(estimator_, settings_.robot, settings_.estimator, as_flags(facts_.sensors), settings_.live,
                             {[this](Output output) {
                                if (output.epoch > 0) return;
-                               files_.write_state(output);
                                if (log_) log_->write_state(output);
+                               level_.hold(output, HeldOutput::Part::state);
                              },
                              [this](Output output) {
                                if (output.epoch > 0) return;
-                               files_.write_sweep(output);
                                if (log_) log_->write_sweep(output);
+                               level_.hold(output, HeldOutput::Part::sweep);
                                keep_map(output);
                              }});
     ReadAhead input(
@@ -192,27 +192,25 @@ class Run {
   void keep(std::vector<Output> outputs) {
     for (Output& output : outputs) {
       if (output.epoch > 0) continue;  // of another recording: failure() says so
-      if (settings_.estimator.gravity_align) levelling_.add(output);
-      if (log_) log_->write_state(output);
-      if (log_) log_->write_sweep(output);
+      if (log_) log(output);
+      level_.look(output);
+      level_.hold(output, HeldOutput::Part::whole);
       keep_map(output);
-      waiting_.emplace_back(std::move(output));
     }
-    if (!settings_.estimator.gravity_align || levelling_.turn()) write_waiting();
   }
 
-  // In the world as it is known to lie by then: nothing is written before.
-  void write_waiting() {
-    for (const HeldOutput& held : waiting_) {
-      Output output = held.output();
-      if (levelling_.turn()) Levelling::apply(*levelling_.turn(), output);
-      files_.write(output);
-    }
-    waiting_.clear();
+  // As a live runner would have answered.
+  void log(Output output) {
+    if (settings_.estimator.gravity_align) answered_.add(output);
+    if (answered_.turn()) Levelling::apply(*answered_.turn(), output);
+    log_->write_state(output);
+    log_->write_sweep(output);
   }
 
+  // In the world as it began, in which the map is one: it is turned as a whole.
   void keep_map(Output& output) {
     if (!options_.with_map) return;
+    if (output.R_LW) Levelling::apply(output.R_LW->inverse(), output);
     if (output.is_sweep) map_.add(std::move(output.points_W));
     if (!output.coloured.empty()) map_.colour(std::move(output.coloured));
   }
@@ -253,11 +251,11 @@ class Run {
   Estimator estimator_;
   MapKeeper map_;
   ResultFiles files_;
+  LevelFiles level_;
+  Levelling answered_{Duration::max()};  // as a live runner does it
   std::unique_ptr<lab::RunLog> log_;
   SkeletonFile skeleton_;
   lab::DescriptionWatch description_;
-  Levelling levelling_;
-  std::vector<HeldOutput> waiting_;  // until the world is level
   Progress progress_;
   bool legs_seen_ = false;
   int foreign_legs_ = 0;

@@ -1,5 +1,6 @@
 #include "apps/cli/summary.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
 #include <fstream>
@@ -66,6 +67,28 @@ Json health_json(const RunFacts& facts, const Statistics& statistics) {
                             {"lag_s", h.mean_lag}};
   }
   return out;
+}
+
+// One for each sensor and reason, as it was last.
+Json events_json(const Statistics& statistics, const std::optional<Event>& levelled) {
+  constexpr const char* severities[] = {"notice", "warning", "error"};
+  std::vector<Event> events = statistics.events;
+  if (levelled) events.push_back(*levelled);
+  Json out = Json::array();
+  for (const Event& e : events) {
+    out.push_back({{"t", to_seconds(e.t.time_since_epoch())},
+                   {"sensor", e.sensor ? Json(name_of(*e.sensor)) : Json()},
+                   {"reason", name_of(e.reason)},
+                   {"severity", severities[static_cast<int>(row_of(e.reason).severity)]},
+                   {"count", e.count},
+                   {"value", e.value},
+                   {"text", text_of(e)}});
+  }
+  return out;
+}
+
+bool has_diverged(const Statistics& statistics) {
+  return std::ranges::any_of(statistics.events, [](const Event& e) { return e.reason == Reason::diverged; });
 }
 
 Json recovery_json(const Statistics& statistics, std::uint64_t live_steps) {
@@ -147,19 +170,20 @@ std::vector<std::string> all_warnings(const RunFacts& facts, const lab::Recordin
 }
 
 std::string summary_json(const RunFacts& facts, const lab::Settings& settings, const lab::RecordingSource& source,
-                         const Statistics& statistics, const RunSummary& run_summary) {
+                         const Statistics& statistics, const std::optional<Event>& levelled, const RunSummary& run_summary) {
   Json json;
   json["version"] = KILVO_VERSION;
   json["input"] = facts.input;
   json["config_file"] = facts.config_file;
   json["failure"] = facts.failure.empty() ? Json() : Json(facts.failure);
-  json["diverged"] = statistics.diverged || !run_summary.absurdity().empty();
+  json["diverged"] = has_diverged(statistics) || !run_summary.absurdity().empty();
   json["input_damaged"] = source.input_damaged();
   json["messages"] = messages_json(facts, source, statistics);
   json["health"] = health_json(facts, statistics);
   json["recovery"] = recovery_json(statistics, facts.live ? facts.live->clock_steps : 0);
   json["degraded"] = run_summary.degraded;
   json["points"] = points_json(facts, source, statistics);
+  json["events"] = events_json(statistics, levelled);
   json["warnings"] = all_warnings(facts, source, statistics);
   json["rollbacks"] = statistics.rollbacks;
   json["lost_stances"] = statistics.lost_stances;

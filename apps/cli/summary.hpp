@@ -29,7 +29,8 @@ struct RunFacts {
 /// All warnings of a run: the choice of sensors, the recording, the estimator.
 std::vector<std::string> all_warnings(const RunFacts& facts, const lab::RecordingSource& source, const Statistics& statistics);
 
+/// `levelled`: the event of the world's turn, which is none of the estimator.
 std::string summary_json(const RunFacts& facts, const lab::Settings& settings, const lab::RecordingSource& source,
-                         const Statistics& statistics, const RunSummary& run_summary);
+                         const Statistics& statistics, const std::optional<Event>& levelled, const RunSummary& run_summary);
 
 }  // namespace kilvo::cli

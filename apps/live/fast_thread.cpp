@@ -83,6 +83,7 @@ void LiveRunner::emit(Clock::time_point since) {
     output.t = *last_output_ + Duration(1000);
   }
   last_output_ = output.t;
+  output.R_LW = forks_.front().R_LW;
   if (Output* slot = outputs_.vacant()) {
     *slot = std::move(output);
     outputs_.push();

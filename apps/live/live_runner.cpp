@@ -1,10 +1,10 @@
 #include "apps/live/live_runner.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "apps/live/raw.hpp"
 #include "apps/live/thread_settings.hpp"
-#include "kilvo/input/clock_step_warning.hpp"
 #include "kilvo/input/fault.hpp"
 
 namespace kilvo::live {
@@ -24,8 +24,9 @@ LiveRunner::LiveRunner(Estimator& estimator, const Robot& robot, const Estimator
       config_(live),
       sinks_(std::move(sinks)),
       samples_(most_samples),
-      forks_({LivePropagator(robot, config), std::nullopt}),
-      outputs_(most_outputs) {
+      forks_({LivePropagator(robot, config), std::nullopt, std::nullopt}),
+      outputs_(most_outputs),
+      gravity_align_(config.gravity_align) {
   if (used_[static_cast<std::size_t>(Sensor::legs)]) {
     const bool forces = config.legs.contact == "force";
     fast_kinematics_.emplace(robot, forces);
@@ -48,7 +49,7 @@ void LiveRunner::push(Measurement m) {
   const auto s = static_cast<std::size_t>(sensor_of(m));
   // What is not to be used the estimator sees as well, and counts.
   const bool usable = used_[s] && !clock_steps_.follow(m);
-  note_clock_steps();
+  note_clock_steps(stamp_of(m));
   if (usable && (imu != nullptr || joints != nullptr)) {
     if (Sample* slot = samples_.vacant()) {
       slot->is_imu = imu != nullptr;
@@ -65,12 +66,17 @@ void LiveRunner::push(Measurement m) {
   backlog_.push({std::move(m), now});
 }
 
-void LiveRunner::note_clock_steps() {
+void LiveRunner::note_clock_steps(Time imu) {
   if (clock_steps_.count() == statistics_.clock_steps) return;
   statistics_.clock_steps = clock_steps_.count();
   constexpr std::uint64_t most = 10;
   if (clock_steps_.count() > most) return;
-  warn(warning_of_last(clock_steps_));
+  // The estimator, which gets the stamps as they are put right, sees nothing of it.
+  const double back = to_seconds(clock_steps_.last());
+  const Event event{imu, Sensor::imu, Reason::imu_clock_stepped, std::abs(back), clock_steps_.count(), back > 0 ? "back" : "ahead"};
+  warn(text_of(event));
+  const std::lock_guard lock(seen_mutex_);
+  own_events_.push_back(event);
 }
 
 bool LiveRunner::is_idle() const {
@@ -142,6 +148,7 @@ void LiveRunner::run_slow() {
     if (Clock::now() - sweep_noise_ >= tell_period) tell();
   }
   outputs = estimator_.finish();
+  level(outputs);
   pass_on(outputs);
   tell();
   const std::lock_guard lock(seen_mutex_);
@@ -151,8 +158,9 @@ void LiveRunner::run_slow() {
 void LiveRunner::answer(std::vector<Output>& outputs, Clock::time_point since) {
   const Modality modality = outputs.back().modality;
   const Time now = outputs.back().t;
+  const bool turned = level(outputs);
   const bool corrected = pass_on(outputs);
-  const bool due = !last_fork_ || now < *last_fork_ || now - *last_fork_ >= fork_period || last_modality_ != modality;
+  const bool due = turned || !last_fork_ || now < *last_fork_ || now - *last_fork_ >= fork_period || last_modality_ != modality;
   last_modality_ = modality;
   if (!corrected && !due) return;
   hand_over(corrected ? std::optional(since) : std::nullopt);
@@ -167,11 +175,32 @@ void LiveRunner::keep_raw(const Measurement& m) {
   if (const auto* feet = std::get_if<Feet>(&known)) slow_raw_.keep(*feet);
 }
 
+// Each is to be turned by what is known by then. True when that has become known.
+bool LiveRunner::level(std::vector<Output>& outputs) {
+  if (!gravity_align_) return false;
+  bool news = false;
+  for (Output& output : outputs) {
+    if (std::exchange(levelling_epoch_, output.epoch) != output.epoch) levelling_ = Levelling(Duration::max());
+    const bool before = levelling_.turn().has_value();
+    levelling_.add(output);
+    output.R_LW = levelling_.turn();
+    news = news || output.R_LW.has_value() != before;
+  }
+  return news;
+}
+
 // Sweeps, images and events; the states in between are the fast thread's. True when there was a sweep or an image.
 bool LiveRunner::pass_on(std::vector<Output>& outputs) {
   bool any = false;
+  {
+    const std::lock_guard lock(seen_mutex_);
+    events_left_.insert(events_left_.end(), own_events_.begin(), own_events_.end());
+    own_events_.clear();
+  }
   for (Output& output : outputs) {
     const bool corrects = output.is_sweep || output.is_image;
+    output.events.insert(output.events.begin(), events_left_.begin(), events_left_.end());
+    events_left_.clear();
     if (!corrects && output.events.empty()) continue;
     any = any || corrects;
     const std::lock_guard lock(slow_outputs_mutex_);
@@ -179,6 +208,7 @@ bool LiveRunner::pass_on(std::vector<Output>& outputs) {
       slow_outputs_.push_back(std::move(output));
       ++sweeps_out_;
     } else {
+      events_left_ = std::move(output.events);
       ++slow_outputs_dropped_;
     }
   }
@@ -190,6 +220,7 @@ void LiveRunner::hand_over(std::optional<Clock::time_point> corrected) {
   Fork& fork = forks_.back();
   if (!estimator_.fork(fork.runner)) return;
   fork.corrected = corrected;
+  fork.R_LW = levelling_.turn();
   slow_raw_.catch_up(fork.runner);
   forks_.publish();
   for_fast_.post();
@@ -207,6 +238,8 @@ void LiveRunner::tell() {
 
 void LiveRunner::carry(const std::function<void(Output)>& sink, Output output) {
   if (failed_) return;
+  // Here, and not where it is answered, since nobody waits for it.
+  if (const auto turn = std::exchange(output.R_LW, std::nullopt)) Levelling::apply(*turn, output);
   try {
     sink(std::move(output));
   } catch (...) {

@@ -21,6 +21,7 @@
 #include "apps/live/ring.hpp"
 #include "apps/live/signal.hpp"
 #include "kilvo/estimator/estimator.hpp"
+#include "kilvo/estimator/levelling.hpp"
 #include "lab/settings/live_config.hpp"
 
 namespace kilvo::live {
@@ -40,7 +41,8 @@ struct LiveStatistics {
 class LiveRunner {
  public:
   /// Each is called by the third thread, in time order by itself. `state`: of every leg sample, or IMU sample. `sweep`: of every sweep and
-  /// image, and whatever has events, as the estimator gives them; their states are of the past.
+  /// image, and whatever has events, as the estimator gives them; their states are of the past. Once gravity is known both are in the level
+  /// world (Output::R_LW), which one output of `sweep` reports as an event: docs/decisions/2026-11-23-level-live.md.
   struct Sinks {
     std::function<void(Output)> state, sweep;
   };
@@ -81,9 +83,10 @@ class LiveRunner {
   struct Fork {
     LivePropagator runner;
     std::optional<Clock::time_point> corrected;  // when the message arrived that completed a sweep or image; none of others
+    std::optional<SO3> R_LW;                     // the turn of the world from now on
   };
 
-  void note_clock_steps();
+  void note_clock_steps(Time imu);
   // The fast thread.
   void run_fast();
   void take(const Sample& sample);
@@ -93,6 +96,7 @@ class LiveRunner {
   void run_slow();
   void answer(std::vector<Output>& outputs, Clock::time_point since);
   void keep_raw(const Measurement& m);
+  bool level(std::vector<Output>& outputs);
   bool pass_on(std::vector<Output>& outputs);
   void hand_over(std::optional<Clock::time_point> corrected);
   void tell();
@@ -117,6 +121,7 @@ class LiveRunner {
   Ring<Output> outputs_;
   std::mutex slow_outputs_mutex_;
   std::vector<Output> slow_outputs_;
+  std::vector<Event> events_left_;  // of outputs that nobody carried away: they go with the next one
   std::uint64_t slow_outputs_dropped_ = 0;
   std::atomic<std::uint64_t> pushed_{0}, processed_{0};  // by the slow thread
   std::atomic<std::uint64_t> sweeps_out_{0}, sweeps_carried_{0};
@@ -136,10 +141,14 @@ class LiveRunner {
   RawSamples slow_raw_;
   std::optional<Time> last_fork_;
   std::optional<Modality> last_modality_;
+  bool gravity_align_;
+  Levelling levelling_{Duration::max()};  // nothing waits for it
+  std::uint32_t levelling_epoch_ = 0;
   Clock::time_point sweep_noise_{};
 
-  mutable std::mutex seen_mutex_;  // and of the warnings
+  mutable std::mutex seen_mutex_;  // and of the warnings and events
   Statistics seen_;
+  std::vector<Event> own_events_;  // that no output has carried yet
   std::string waiting_for_;
   LiveStatistics statistics_;
   std::thread fast_, slow_, output_;  // last: they use all of the above

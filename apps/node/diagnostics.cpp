@@ -76,10 +76,34 @@ DiagnosticStatus status_of(Sensor sensor, const Condition& c) {
   return out;
 }
 
+// A warning stands for so long after it was true last; an event that goes on is told again. It stays in the values.
+constexpr Duration standing = std::chrono::seconds(60);
+
+/// The newest of the worst events that still stand, above notices.
+const Event* standing_warning(const EstimateState& e) {
+  const Event* out = nullptr;
+  for (const Event& event : e.events) {
+    const Severity severity = row_of(event.reason).severity;
+    if (severity == Severity::notice || e.t - event.t > standing) continue;
+    if (out == nullptr || severity >= row_of(out->reason).severity) out = &event;
+  }
+  return out;
+}
+
+void add_events(DiagnosticStatus& status, const EstimateState& e) {
+  constexpr const char* severities[] = {"notice", "warning", "error"};
+  for (const Event& event : e.events) {
+    add(status, severities[static_cast<int>(row_of(event.reason).severity)],
+        fmt::format("{}: {:.3f} s, {} times, {}", name_of(event.reason), to_seconds(event.t.time_since_epoch()), event.count,
+                    text_of(event)));
+  }
+}
+
 DiagnosticStatus status_of_estimate(const Condition& c) {
   DiagnosticStatus out = named("estimator");
   if (!c.estimate) {
     say(out, DiagnosticStatus::warn, c.waiting_for.empty() ? "waiting for the first output" : c.waiting_for);
+    for (const std::string& warning : warnings_of(c.seen)) add(out, "warning", warning);
     return out;
   }
   std::string lost;
@@ -95,7 +119,13 @@ DiagnosticStatus status_of_estimate(const Condition& c) {
   std::string text = fmt::format("{} ({})", name_of(e.modality), text_of(e.cause));
   if (!lost.empty()) text += ", lost: " + lost;
   if (!c.base_waits_for.empty()) text += ", " + c.base_waits_for;
+  if (e.epoch > 0) text += fmt::format(", epoch {}", e.epoch + 1);
   if (c.seen.diverged) text += ", diverged";
+  if (const Event* event = standing_warning(e)) {
+    const bool is_error = row_of(event->reason).severity == Severity::error;
+    level = std::max<std::uint8_t>(level, is_error ? DiagnosticStatus::error : DiagnosticStatus::warn);
+    text += ", " + text_of(*event);
+  }
   for (const lab::WrongDescription& wrong : c.wrong) {
     if (!wrong.spoils) continue;
     level = DiagnosticStatus::error;
@@ -105,12 +135,13 @@ DiagnosticStatus status_of_estimate(const Condition& c) {
   add(out, "modality", name_of(e.modality));
   add(out, "cause", text_of(e.cause));
   add(out, "lost", lost.empty() ? "none" : lost);
+  add(out, "epoch", std::to_string(e.epoch + 1));
   add(out, "outputs", std::to_string(e.outputs));
   add(out, "position, one sigma (m)", fmt::format("{:.4f}", std::sqrt(std::max(0.0, e.position_covariance.trace()))));
   add(out, "IMU outages", std::to_string(c.seen.imu_outages));
   add(out, "states thrown away", std::to_string(c.seen.rollbacks));
   add(out, "sweeps not mapped in time", std::to_string(c.clouds_given_up));
-  for (const std::string& warning : warnings_of(c.seen)) add(out, "warning", warning);
+  add_events(out, e);
   for (const lab::WrongDescription& wrong : c.wrong) add(out, "description", text_of(wrong));
   return out;
 }

@@ -65,6 +65,58 @@ TEST(Diagnostics, AreAtErrorWhenTheDescriptionIsWrong) {
   EXPECT_EQ(message_of(all, "kilvo: imu"), "ok") << "nobody else is accused";
 }
 
+// A state of 100 s with one event.
+Condition with_event(const Event& event) {
+  Condition c = all_is_well();
+  c.estimate->t = Time(from_seconds(100));
+  c.estimate->events = {event};
+  return c;
+}
+
+std::string value_of(const DiagnosticStatus& status, const std::string& key) {
+  for (const KeyValue& value : status.values) {
+    if (value.key == key) return value.value;
+  }
+  return "no value of this key";
+}
+
+TEST(Diagnostics, AWarningRaisesTheLevelForAMinuteAndStaysInTheValues) {
+  for (const auto& [seconds, level] :
+       {std::pair(99.9, DiagnosticStatus::warn), std::pair(41.0, DiagnosticStatus::warn), std::pair(39.0, DiagnosticStatus::ok)}) {
+    const DiagnosticStatus status =
+        statuses(with_event({Time(from_seconds(seconds)), Sensor::imu, Reason::gyro_clipped, 35, 4, {}})).front();
+    EXPECT_EQ(+status.level, +level) << seconds;
+    EXPECT_EQ(status.message.find("imu: the gyroscope is at the end of its range") != std::string::npos, level == DiagnosticStatus::warn);
+    EXPECT_EQ(value_of(status, "warning"), "gyro_clipped: " + std::to_string(static_cast<int>(seconds)) +
+                                               (seconds == 99.9 ? ".900" : ".000") +
+                                               " s, 4 times, imu: the gyroscope is at the end of its range, 35.0 rad/s (4 times)");
+  }
+}
+
+TEST(Diagnostics, ANoticeIsListedAndRaisesNothing) {
+  const DiagnosticStatus status = statuses(with_event({Time(from_seconds(99)), {}, Reason::levelled, 0.4 * M_PI / 180, 1, {}})).front();
+  EXPECT_EQ(+status.level, +DiagnosticStatus::ok);
+  EXPECT_EQ(value_of(status, "notice"), "levelled: 99.000 s, 1 times, the world was turned by 0.40 degrees, so that its z axis is up");
+}
+
+TEST(Diagnostics, AnErrorIsNoMereWarning) {
+  const DiagnosticStatus status = statuses(with_event({Time(from_seconds(99)), Sensor::lidar, Reason::map_begun_anew, 0, 1, {}})).front();
+  EXPECT_EQ(+status.level, +DiagnosticStatus::error);
+  EXPECT_NE(status.message.find("the map was begun anew"), std::string::npos);
+}
+
+TEST(Diagnostics, NameTheEpoch) {
+  Condition c = with_event({Time(from_seconds(99)), {}, Reason::began_anew, 20, 1, {}});
+  EXPECT_EQ(value_of(statuses(all_is_well()).front(), "epoch"), "1");
+  c.estimate->epoch = 1;
+  const DiagnosticStatus status = statuses(c).front();
+  EXPECT_EQ(value_of(status, "epoch"), "2");
+  EXPECT_NE(status.message.find("epoch 2"), std::string::npos);
+  EXPECT_NE(status.message.find("the time went back by 20.0 s"), std::string::npos);
+  EXPECT_EQ(+status.level, +DiagnosticStatus::warn);
+  EXPECT_NE(essence(statuses(c)), essence(statuses(all_is_well()))) << "told at once";
+}
+
 TEST(Diagnostics, SayWhyASensorIsNotUsed) {
   Condition c = all_is_well();
   c.inputs[0].last.reset();

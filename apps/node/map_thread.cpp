@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "apps/node/clouds.hpp"
+#include "kilvo/estimator/levelling.hpp"
 #include "lab/mapping/ply.hpp"
 
 namespace kilvo::node {
@@ -43,29 +44,36 @@ void MapThread::run() {
   while (true) {
     news_.wait(lock, [this] { return ended_ || !waiting_.empty(); });
     if (ended_) return;
-    const Output output = std::move(waiting_.front());
+    Output output = std::move(waiting_.front());
     waiting_.pop_front();
     lock.unlock();
-    put(output);
+    put(std::move(output));
     lock.lock();
   }
 }
 
-void MapThread::put(const Output& output) {
+void MapThread::put(Output output) {
   if (output.is_sweep && outlet_.is_wanted(Topic::cloud))
     outlet_.publish(Topic::cloud, output.t, cloud_message(output.points_W, output.t, frame_));
   if (!output.coloured.empty() && outlet_.is_wanted(Topic::coloured))
     outlet_.publish(Topic::coloured, output.t, cloud_message(output.coloured, output.t, frame_));
   const std::lock_guard lock(map_mutex_);
   // The map of another epoch is of another world.
-  if (std::exchange(epoch_, output.epoch) != output.epoch) map_ = lab::MapBuilder(config_);
+  if (std::exchange(epoch_, output.epoch) != output.epoch) {
+    map_ = lab::MapBuilder(config_);
+    turn_.reset();
+  }
+  if (output.R_LW) {
+    turn_ = output.R_LW;
+    Levelling::apply(turn_->inverse(), output);
+  }
   if (output.is_sweep) map_.add(output.points_W);
   if (!output.coloured.empty()) map_.colour(output.coloured);
 }
 
 std::size_t MapThread::save(const std::string& path) {
   const std::lock_guard lock(map_mutex_);
-  lab::write_ply(path, map_);
+  lab::write_ply(path, map_, turn_.value_or(SO3()));
   return map_.size();
 }
 
@@ -76,6 +84,7 @@ void MapThread::clear() {
   }
   const std::lock_guard lock(map_mutex_);
   map_ = lab::MapBuilder(config_);
+  turn_.reset();
 }
 
 std::uint64_t MapThread::given_up() const {

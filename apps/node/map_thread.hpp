@@ -35,7 +35,7 @@ class MapThread {
 
  private:
   void run();
-  void put(const Output& output);
+  void put(Output output);
 
   lab::MappingConfig config_;
   std::string frame_;
@@ -49,8 +49,9 @@ class MapThread {
 
   std::mutex map_mutex_;
   std::uint32_t epoch_ = 0;
-  lab::MapBuilder map_;
-  std::thread thread_;  // last: it uses all of the above
+  lab::MapBuilder map_;      // in the world as it began
+  std::optional<SO3> turn_;  // that has levelled it
+  std::thread thread_;       // last: it uses all of the above
 };
 
 }  // namespace kilvo::node

@@ -61,7 +61,10 @@ Node::Life::Life(const lab::Settings& settings, live::LiveRunner::Sinks sinks)
 
 std::unique_ptr<Node::Life> Node::begin_life() {
   return std::make_unique<Life>(settings_, live::LiveRunner::Sinks{[this](Output output) { states_.take(output); },
-                                                                   [this](Output output) { map_.take(std::move(output)); }});
+                                                                   [this](Output output) {
+                                                                     states_.note_events(output);
+                                                                     if (output.is_sweep || output.is_image) map_.take(std::move(output));
+                                                                   }});
 }
 
 void Node::end_life() {

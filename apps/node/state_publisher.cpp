@@ -40,7 +40,7 @@ StatePublisher::StatePublisher(const Options& options, const lab::Settings& sett
 }
 
 void StatePublisher::take(const Output& output) {
-  if (std::exchange(epoch_, output.epoch) != output.epoch) clear();
+  if (!is_of_this_epoch(output)) return;
   const auto base = base_.newest();
   BodyMotion best = body_motion(output, base ? base->base : LinkMotion{}, rate_variance_);
   if (!trusted_) {
@@ -58,13 +58,34 @@ void StatePublisher::take(const Output& output) {
     last_tf_ = output.t;
     publish_transforms(output.x.pose() * base->tf.T_IL, T_OI * base->tf.T_IL, output.t);
   }
-  extend_path(best, output.t);
+  extend_path(best, output.t, output.R_LW);
+}
+
+// With the first output of an epoch everything begins anew; its events come before the last states of the one before.
+bool StatePublisher::is_of_this_epoch(const Output& output) {
+  if (output.epoch > epoch_) {
+    clear();
+    epoch_ = output.epoch;
+  }
+  return output.epoch == epoch_;
+}
+
+void StatePublisher::note_events(const Output& output) {
+  if (output.events.empty() || !is_of_this_epoch(output)) return;
+  const std::lock_guard lock(mutex_);
+  for (const Event& event : output.events) {
+    const auto same = [&event](const Event& e) { return e.sensor == event.sensor && e.reason == event.reason; };
+    std::erase_if(events_, same);
+    // What the epoch before had not told yet comes with the first output of this one, by another time.
+    if (event.t <= output.t) events_.push_back(event);
+  }
 }
 
 void StatePublisher::note(const Output& output, const BodyMotion& best) {
   const std::lock_guard lock(mutex_);
   if (!newest_) newest_.emplace();
   newest_->t = output.t;
+  newest_->epoch = output.epoch;
   newest_->modality = output.modality;
   newest_->cause = output.cause;
   newest_->position_covariance = best.pose_covariance.topLeftCorner<3, 3>();
@@ -125,10 +146,20 @@ void StatePublisher::publish_ground(const Contacts& contacts) {
   outlet_.publish(Topic::ground, contacts.t, message);
 }
 
-void StatePublisher::extend_path(const BodyMotion& best, Time t) {
+// The way is one, and so is the world that it is in.
+void StatePublisher::turn_way(const SO3& R_LW) {
+  for (PoseStamped& stamped : way_.poses) {
+    const auto& [p, q] = stamped.pose;
+    stamped.pose = pose_message(SE3{R_LW, Eigen::Vector3d::Zero()} *
+                                SE3{SO3::from_quaternion(Eigen::Quaterniond(q.w, q.x, q.y, q.z)), Eigen::Vector3d(p.x, p.y, p.z)});
+  }
+}
+
+void StatePublisher::extend_path(const BodyMotion& best, Time t, const std::optional<SO3>& R_LW) {
   if (last_path_ && t - *last_path_ < path_period) return;
   last_path_ = t;
   const std::lock_guard lock(mutex_);
+  if (R_LW && !std::exchange(way_is_level_, true)) turn_way(*R_LW);
   way_.header.stamp = t;
   if (!way_.poses.empty()) {
     const Vector& last = way_.poses.back().pose.position;
@@ -157,7 +188,9 @@ void StatePublisher::publish_path() {
 
 std::optional<EstimateState> StatePublisher::newest() const {
   const std::lock_guard lock(mutex_);
-  return newest_;
+  std::optional<EstimateState> out = newest_;
+  if (out) out->events = events_;
+  return out;
 }
 
 void StatePublisher::clear() {
@@ -166,9 +199,12 @@ void StatePublisher::clear() {
   last_ground_.reset();
   last_path_.reset();
   const std::lock_guard lock(mutex_);
+  epoch_ = 0;
   newest_.reset();
+  events_.clear();
   way_.poses.clear();
   way_has_grown_ = true;
+  way_is_level_ = false;
 }
 
 }  // namespace kilvo::node

@@ -18,10 +18,12 @@ namespace kilvo::node {
 /// What the newest state says of the estimate as a whole.
 struct EstimateState {
   Time t{};
+  std::uint32_t epoch = 0;  // Output::epoch
   Modality modality = Modality::coast;
   Reason cause = Reason::start;
   std::uint64_t outputs = 0;
   Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();  // m^2
+  std::vector<Event> events;                                      // of this epoch: one for each sensor and reason, as it went out last
 };
 
 class StatePublisher {
@@ -29,8 +31,11 @@ class StatePublisher {
   /// `base` must outlive it.
   StatePublisher(const Options& options, const lab::Settings& settings, const BaseFrame& base, Outlet outlet);
 
-  /// In time order, from one thread.
+  /// In time order, from one thread; states of an epoch that has ended are left out.
   void take(const Output& output);
+
+  /// What an output reports beside its state, of whatever time it is. From the same thread.
+  void note_events(const Output& output);
 
   /// Of the newest state; none before the first.
   std::optional<EstimateState> newest() const;
@@ -45,12 +50,14 @@ class StatePublisher {
   void clear();
 
  private:
+  bool is_of_this_epoch(const Output& output);
+  void turn_way(const SO3& R_LW);
   void note(const Output& output, const BodyMotion& best);
   void publish(Topic topic, const BodyMotion& motion, Time t, const std::string& frame) const;
   void publish_transforms(const SE3& best, const SE3& smooth, Time t) const;
   void publish_contacts(const Contacts& contacts) const;
   void publish_ground(const Contacts& contacts);
-  void extend_path(const BodyMotion& best, Time t);
+  void extend_path(const BodyMotion& best, Time t, const std::optional<SO3>& R_LW);
 
   std::string map_frame_, odom_frame_;
   const BaseFrame& base_;
@@ -66,8 +73,9 @@ class StatePublisher {
 
   mutable std::mutex mutex_;
   std::optional<EstimateState> newest_;
+  std::vector<Event> events_;
   Path way_;
-  bool way_has_grown_ = false;
+  bool way_has_grown_ = false, way_is_level_ = false;
 };
 
 }  // namespace kilvo::node

@@ -28,15 +28,15 @@ std::int64_t RateOffset::place_of(Time t) const { return static_cast<std::int64_
 
 void RateOffset::add_reference(Time t, const Eigen::Vector3d& rate) {
   constexpr double longest_gap = 0.1;  // s
-  if (last_reference_ && t <= *last_reference_) return;
-  if (!last_reference_ || to_seconds(t - *last_reference_) > longest_gap) {
-    // What came before the gap is of no use.
+  const double span = last_reference_ ? to_seconds(t - *last_reference_) : 2 * longest_gap;
+  if (span <= 0 && span > -longest_gap) return;
+  if (std::abs(span) > longest_gap) {
+    // What came before the gap, or before a recording was played again, is of no use. The offset is of the clocks, and stays.
     origin_ = t;
     end_ = 0;
     first_waiting_ = 0;
     waiting_.clear();
   } else {
-    const double span = to_seconds(t - *last_reference_);
     for (; place_of(t) >= end_; ++end_) {
       const double share = std::clamp((static_cast<double>(end_) * step - to_seconds(*last_reference_ - *origin_)) / span, 0.0, 1.0);
       reference_[static_cast<std::size_t>(end_) % kept] = last_rate_ + share * (rate - last_rate_);

@@ -67,6 +67,8 @@ void Findings::look(Time t, const Situation& now) {
 Findings Findings::next_epoch() {
   Findings next;
   next.statistics_ = std::move(statistics_);
+  next.statistics_.diverged = false;
+  next.statistics_.clock_shift = {};
   next.events_ = std::move(events_);
   next.drops_ = drops_;
   // What was before is not judged again.

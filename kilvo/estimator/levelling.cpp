@@ -8,14 +8,13 @@
 namespace kilvo {
 namespace {
 
-// Known well enough, rad; whoever waits for it does not wait for ever.
-constexpr double known = 1e-3;
-constexpr Duration longest = std::chrono::seconds(20);
+constexpr double known = 1e-3;  // well enough, rad
 
 }  // namespace
 
-void Levelling::add(const Output& o) {
+void Levelling::add(Output& o) {
   if (R_LW_) return;
+  last_ = o.t;
   g_ = o.x.g;
   // Two directions: its length is known.
   const double scale = 1 / std::max(1.0, g_.norm());
@@ -25,25 +24,33 @@ void Levelling::add(const Output& o) {
     first_ = o.t;
     first_sigma_ = sigma_;
   }
-  if (sigma_ < known || o.t - *first_ > longest) finish();
+  if (!(sigma_ < known) && o.t - *first_ <= longest_) return;
+  if (const auto event = finish()) o.events.push_back(*event);
 }
 
-void Levelling::finish() {
-  if (R_LW_ || !first_) return;
+std::optional<Event> Levelling::finish() {
+  if (R_LW_ || !first_) return std::nullopt;
   R_LW_ = SO3();
   // Knowing one of two directions is better than none.
-  if (!(least_sigma_ < 0.5 * first_sigma_) || !(g_.z() < 0)) return;
+  if (!(least_sigma_ < 0.5 * first_sigma_) || !(g_.z() < 0)) return std::nullopt;
   const Eigen::Vector3d up = -g_.normalized();
   R_LW_ = SO3::nearest(Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix());
+  return Event{last_, {}, Reason::levelled, R_LW_->Log().norm(), 1, {}};
 }
 
 void Levelling::apply(const SO3& R_LW, Output& o) {
   const Eigen::Matrix3d& R = R_LW.matrix();
   o.x.R = R_LW * o.x.R;
+  o.R_LW = R_LW * o.R_LW.value_or(SO3());
   for (Eigen::Vector3d* v : {&o.x.p, &o.x.v, &o.x.g, &o.x.pc[0], &o.x.pc[1]}) *v = R * *v;
   for (const int block : {at::v, at::p, at::g, at::pcl, at::pcr}) {
     o.P.middleRows<3>(block) = (R * o.P.middleRows<3>(block)).eval();
     o.P.middleCols<3>(block) = (o.P.middleCols<3>(block) * R.transpose()).eval();
+  }
+  if (o.contacts) {
+    for (Eigen::Vector3d* v : {&o.contacts->normal, &o.contacts->ground[0].normal, &o.contacts->ground[0].point,
+                               &o.contacts->ground[1].normal, &o.contacts->ground[1].point})
+      *v = R * *v;
   }
   const Eigen::Matrix3f Rf = R.cast<float>();
   for (PointXYZI& x : o.points_W) x.head<3>() = (Rf * x.head<3>()).eval();

@@ -21,13 +21,26 @@ Output walking(double s) {
   return o;
 }
 
+std::vector<Event> events_of(Levelling& levelling, double from, double until) {
+  std::vector<Event> out;
+  for (double s = from; s < until; s += 0.1) {
+    Output o = walking(s);
+    levelling.add(o);
+    out.insert(out.end(), o.events.begin(), o.events.end());
+  }
+  return out;
+}
+
 TEST(Levelling, TurnsTheWorldOnceGravityIsKnown) {
   Levelling levelling;
-  for (double s = 0; s < 3.9; s += 0.1) levelling.add(walking(s));
+  EXPECT_TRUE(events_of(levelling, 0, 3.9).empty());
   EXPECT_FALSE(levelling.turn());
-  for (double s = 4; s < 5; s += 0.1) levelling.add(walking(s));
+  const std::vector<Event> events = events_of(levelling, 4, 5);
   ASSERT_TRUE(levelling.turn());
-  EXPECT_NEAR(levelling.tilt(), 0.5 * M_PI / 180, 1e-9);
+  ASSERT_EQ(events.size(), 1u) << "once";
+  EXPECT_EQ(text_of(events.front()), "the world was turned by 0.50 degrees, so that its z axis is up");
+  EXPECT_EQ(events.front().t, walking(4).t);
+  EXPECT_FALSE(levelling.finish()) << "reported already";
   Output o = walking(5);
   const double trace = o.P.trace();
   Levelling::apply(*levelling.turn(), o);
@@ -38,12 +51,57 @@ TEST(Levelling, TurnsTheWorldOnceGravityIsKnown) {
   EXPECT_NEAR(o.points_W[0].head<3>().norm(), std::sqrt(14), 1e-5);
 }
 
+TEST(Levelling, WaitsAsLongAsItMay) {
+  // One of two directions is known better than at the start.
+  const auto half_known = [](double s) {
+    Output o = walking(0);
+    o.t = walking(s).t;
+    if (s > 1) o.P(at::g, at::g) = 1e-4;
+    return o;
+  };
+  Levelling patient(Duration::max()), usual;
+  for (double s = 0; s < 25; s += 0.5) {
+    Output a = half_known(s), b = half_known(s);
+    patient.add(a);
+    usual.add(b);
+    EXPECT_EQ(usual.turn().has_value(), s > 20) << s;
+    EXPECT_EQ(b.events.size(), s == 20.5 ? 1u : 0u) << s;
+  }
+  EXPECT_FALSE(patient.turn());
+}
+
+TEST(Levelling, TurnsTheGroundUnderTheFeetWithTheWorld) {
+  Output o = walking(5);
+  const SO3 tilted = o.x.R, level = tilted.inverse();
+  o.contacts.emplace();
+  o.contacts->normal = tilted * Eigen::Vector3d::UnitZ();
+  for (GroundPatch& patch : o.contacts->ground) patch = {tilted * Eigen::Vector3d::UnitZ(), tilted * Eigen::Vector3d(5, 10, 0), 0.01};
+  Levelling::apply(level, o);
+  EXPECT_NEAR(o.contacts->normal.z(), 1, 1e-12);
+  for (const GroundPatch& patch : o.contacts->ground) {
+    EXPECT_NEAR(patch.normal.z(), 1, 1e-12);
+    EXPECT_NEAR((patch.point - Eigen::Vector3d(5, 10, 0)).norm(), 0, 1e-12);
+  }
+}
+
+TEST(Levelling, SaysWhichWorldAnOutputIsIn) {
+  Output o = walking(5);
+  const Output before = o;
+  EXPECT_FALSE(o.R_LW);
+  const SO3 level = o.x.R.inverse();
+  Levelling::apply(level, o);
+  ASSERT_TRUE(o.R_LW);
+  Levelling::apply(o.R_LW->inverse(), o);
+  EXPECT_NEAR((o.x.p - before.x.p).norm(), 0, 1e-12);
+  EXPECT_NEAR((o.points_W[0] - before.points_W[0]).norm(), 0, 1e-5);
+}
+
 TEST(Levelling, LeavesAWorldAloneWhoseGravityNobodyLearnt) {
   Levelling levelling;
-  for (double s = 0; s < 3; s += 0.1) levelling.add(walking(s));
-  levelling.finish();
+  EXPECT_TRUE(events_of(levelling, 0, 3).empty());
+  EXPECT_FALSE(levelling.finish());
   ASSERT_TRUE(levelling.turn());
-  EXPECT_EQ(levelling.tilt(), 0);
+  EXPECT_EQ(levelling.turn()->Log().norm(), 0);
 }
 
 }  // namespace

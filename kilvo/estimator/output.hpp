@@ -32,6 +32,7 @@ struct Output {
   Time t{};
   std::uint32_t epoch = 0;  // grows when the time went back and everything began anew: another world, another time
   State x;
+  std::optional<SO3> R_LW;                          // the turn that has levelled the world (Levelling::apply); none: as it began
   Covariance P = Covariance::Zero();                // of the error relative to the first pose (state.hpp: at)
   Eigen::Vector3d omega = Eigen::Vector3d::Zero();  // bias-free angular rate of the newest IMU sample, in the IMU frame, rad/s
   Modality modality = Modality::coast;

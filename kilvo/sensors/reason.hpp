@@ -61,6 +61,7 @@ enum class Reason : std::uint8_t {
   agrees_with_nothing,
   // findings
   began_anew,
+  levelled,
   moving_start,
   strange_gravity,
   imu_clock_stepped,
@@ -139,6 +140,8 @@ inline constexpr std::array reasons = {
     ReasonRow{Reason::agrees_with_nothing, Severity::warning, "agrees_with_nothing", "agrees with nothing"},
     ReasonRow{Reason::began_anew, Severity::warning, "began_anew",
               "the time went back by {} s: what follows is another recording, or the same again; everything begins anew", 1, 1},
+    ReasonRow{Reason::levelled, Severity::notice, "levelled", "the world was turned by {} degrees, so that its z axis is up", 57.295779513,
+              2},
     ReasonRow{Reason::moving_start, Severity::warning, "moving_start",
               "the robot did not stand still: started on the move, with wide uncertainties"},
     ReasonRow{Reason::strange_gravity, Severity::warning, "strange_gravity",

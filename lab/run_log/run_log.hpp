@@ -11,7 +11,7 @@
 
 namespace kilvo::lab {
 
-/// Everything as it was known then (the files of a run are levelled afterwards). Frames: `map` is the world, `imu` the IMU. Topics:
+/// Everything as it was known then (the files of a run are level from the first row on). Frames: `map` is the world, `imu` the IMU. Topics:
 /// /kilvo/odometry (each output) and /tf (100 Hz) of the IMU; /kilvo/contacts (each leg sample: position is the clearance in m, velocity
 /// how far the foot is from standing still, effort 1 while it stands); /kilvo/cloud (each sweep, thinned); /kilvo/modality and
 /// /kilvo/events (when they change); /kilvo/timing (microseconds of each stage).

@@ -29,6 +29,7 @@ class WrongDescription : public testing::Test {
     EXPECT_EQ(eval.code, 0) << eval.err;
     return eval.code == 0 ? nlohmann::json::parse(eval.out).at("ate_rmse_m").get<double>() : INFINITY;
   }
+  nlohmann::json events() const { return nlohmann::json::parse(result("summary.json")).at("events"); }
   static std::string pitched_by(double degrees) {
     const double a = degrees * 0.01745329251994;
     return fmt::format("lidar.T_imu_lidar.R=[{0}, 0, {1}, 0, 1, 0, -{1}, 0, {0}]", std::cos(a), std::sin(a));
@@ -74,6 +75,44 @@ TEST_F(WrongDescription, IsNotJudgedWhereItIsToBeTrusted) {
     ASSERT_EQ(kilvo(words).code, 0);
   }
   EXPECT_EQ(result("odometry.tum"), read_text(out_ + "--trust-description/odometry.tum"));
+}
+
+// Nobody holds the data against the description: the estimate itself does.
+TEST_F(WrongDescription, ThatIsTrustedEndsInAFailureThatNamesTheSensesThatContradict) {
+  for (const std::string sensors : {"imu,legs,lidar", "imu,lidar"}) {
+    const Finished f =
+        kilvo({"run", walk_, "--sensors", sensors, "--set", pitched_by(20), "--out", out_, "--quiet", "--no-map", "--trust-description"});
+    EXPECT_EQ(f.code, 1) << sensors;
+    EXPECT_THAT(f.err, HasSubstr("kilvo: error: diverged: the IMU and the LiDAR contradict each other: ")) << sensors;
+    const auto summary = nlohmann::json::parse(result("summary.json"));
+    EXPECT_EQ(summary.at("diverged"), true);
+    EXPECT_THAT(summary.at("failure"), HasSubstr("the IMU and the LiDAR contradict each other"));
+  }
+}
+
+TEST_F(WrongDescription, IsAnEventWithItsTimeReasonAndCount) {
+  kilvo({"run", walk_, "--sensors", "imu,lidar", "--set", pitched_by(20), "--out", out_, "--quiet", "--no-map", "--trust-description"});
+  bool found = false;
+  for (const auto& event : events()) {
+    for (const char* key : {"t", "sensor", "reason", "severity", "count", "value", "text"}) EXPECT_TRUE(event.contains(key)) << key;
+    if (event.at("reason") != "diverged") continue;
+    found = true;
+    EXPECT_EQ(event.at("severity"), "error");
+    EXPECT_EQ(event.at("sensor"), nullptr);
+    EXPECT_EQ(event.at("count"), 1);
+    EXPECT_NEAR(event.at("t").get<double>(), 1700000006, 5);
+    EXPECT_THAT(event.at("text"), HasSubstr("contradict each other"));
+  }
+  EXPECT_TRUE(found);
+}
+
+TEST_F(WrongDescription, IsNoneWhereTheWorldWasLevelled) {
+  ASSERT_EQ(kilvo({"run", walk_, "--sensors", "imu,legs,lidar", "--out", out_, "--quiet", "--no-map"}).code, 0);
+  std::vector<std::string> reasons;
+  for (const auto& event : events())
+    reasons.push_back(event.at("severity").get<std::string>() + " " + event.at("reason").get<std::string>());
+  EXPECT_THAT(reasons, testing::ElementsAre("notice start", "notice levelled")) << "and no warning";
+  EXPECT_THAT(result("events.csv"), HasSubstr(",,levelled,"));
 }
 
 TEST_F(WrongDescription, OfTheOnlySenseIsMended) {

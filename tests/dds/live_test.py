@@ -164,6 +164,29 @@ class LiveTest(unittest.TestCase):
         for topic in ("/kilvo/odometry", "/kilvo/cloud", "/kilvo/cloud_coloured", "/kilvo/contacts", "/tf", "/diagnostics"):
             self.assertRegex(info, topic + " .*_?msgs/")
 
+    def test_f_a_recording_that_is_played_again_begins_anew(self):
+        live = STORY.live("--set", "live.base=imu")
+        listener = STORY.listen("twice.tum", 2 * SECONDS + 8)
+        time.sleep(0.5)
+        for _ in range(2):
+            STORY.play("--stamps", "recorded").process.wait(60)
+        self.assertTrue(wait_until(lambda: "epoch 2" in live.said()), live.said())
+        self.heard(listener)
+        self.assertEqual(live.end(), 0, live.said())
+        self.assertIn("the time went back by", live.said())
+        self.assertNotIn("diverged", live.said())
+        with open(os.path.join(STORY.folder, "twice.tum"), encoding="utf-8") as file:
+            lines = file.readlines()
+        t = [float(line.split()[0]) for line in lines]
+        back = [i for i in range(1, len(t)) if t[i] < t[i - 1]]
+        self.assertEqual(len(back), 1, "once, to the recording's own stamps")
+        self.assertLess(max(abs(float(x)) for x in lines[back[0]].split()[1:4]), 0.05, "from the start")
+        for name, part in (("first.tum", lines[:back[0]]), ("second.tum", lines[back[0]:])):
+            with open(os.path.join(STORY.folder, name), "w", encoding="utf-8") as file:
+                file.writelines(part)
+            self.assertGreater(len(part), 300)
+            self.assertLess(self.error_of(name), 0.02, name)
+
     def test_d_what_cannot_be_is_refused(self):
         for words, text in ((("--interface", "no_such_interface"), "cannot be entered"), (("--set", "live.base=tail"), "nearest is")):
             program = Program(ARGUMENTS.kilvo, "live", "--config", STORY.config, "--domain", STORY.domain, *words)

@@ -1,6 +1,6 @@
 // The other side of `kilvo live` in tests: Fast DDS, which is another vendor's, plays a recording as a robot would, and listens.
 //
-//   peer play BAG DOMAIN [--legs lowstate] [--start S] [--seconds S] [--only imu,legs,lidar,camera]
+//   peer play BAG DOMAIN [--legs lowstate] [--stamps recorded] [--start S] [--seconds S] [--only imu,legs,lidar,camera]
 //   peer listen DOMAIN FILE.tum SECONDS     odometry into a file; at the end a line of JSON: how many of what
 //   peer call DOMAIN SERVICE [0|1]          asks a service as rmw_cyclonedds does (kilvo/save_map; kilvo/pause/lidar 1); its answer as JSON
 //   peer garbage DOMAIN SECONDS             bytes that are no Imu, on the IMU's topic
@@ -101,12 +101,13 @@ Measurement moved(Measurement m, Duration by) {
   return m;
 }
 
-/// The walk's messages in real time, stamped as if it were now.
+/// The walk's messages in real time, stamped as if it were now unless they are to be as they were recorded.
 class Player {
  public:
   explicit Player(const Words& words)
       : peer_(std::stoi(words.plain.at(2))),
         with_low_state_(words.option("--legs", "") == "lowstate"),
+        as_recorded_(words.option("--stamps", "") == "recorded"),
         source_(words.plain.at(1), options_of(words)) {
     const std::string only = words.option("--only", "imu,legs,lidar");
     if (only.find("imu") != std::string::npos) imu_ = peer_.writer("rt/imu", "sensor_msgs::msg::dds_::Imu_", false);
@@ -127,7 +128,7 @@ class Player {
       if (!first) first = source_.recorded();
       const Time due = began + (source_.recorded() - *first);
       if (const auto wait = due - wall_now(); wait.count() > 0) std::this_thread::sleep_for(wait);
-      send(moved(*std::move(m), began - *first));
+      send(moved(*std::move(m), as_recorded_ ? Duration(0) : began - *first));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
   }
@@ -177,7 +178,7 @@ class Player {
   }
 
   Peer peer_;
-  bool with_low_state_;
+  bool with_low_state_, as_recorded_;
   lab::RecordingSource source_;
   DataWriter *imu_ = nullptr, *legs_ = nullptr, *lidar_ = nullptr, *camera_ = nullptr;
   ImuSample newest_;

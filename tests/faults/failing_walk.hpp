@@ -44,6 +44,7 @@ struct Moment {
 struct Outcome {
   std::vector<Moment> moments;  // of each output
   Statistics statistics;
+  std::vector<std::pair<double, Event>> events;  // of all outputs, with the time of the output, s
   bool finite = true, ordered = true;
 
   double worst(double Moment::*part, double from, double until) const {
@@ -96,9 +97,11 @@ struct Changes {
 
 class FailingWalk {
  public:
-  FailingWalk(const std::string& name, std::uint64_t seed, double seconds, bool camera = false, double accel_range = 160) {
+  FailingWalk(const std::string& name, std::uint64_t seed, double seconds, bool camera = false, double accel_range = 160,
+              double accel_bias_sigma = lab::ImuModel().accel_bias_sigma) {
     lab::SimulatorConfig config = small(seconds);
     config.seed = seed;
+    config.imu.accel_bias_sigma = accel_bias_sigma;
     config.imu.accel_range = accel_range;
     config.lidar.points = 4000;
     config.joints.delivery.rate = 500;
@@ -117,6 +120,7 @@ class FailingWalk {
 
   const lab::Settings& settings() const { return settings_; }
   const std::array<bool, sensor_count>& used() const { return used_; }
+  SE3 truth(Time t) const { return simulator_->walk().imu(simulator_->seconds_of(t)); }
   Time time(double seconds) const { return simulator_->start() + from_seconds(seconds); }
 
   /// Every measurement that arrives, in order.
@@ -144,14 +148,15 @@ class FailingWalk {
     return out;
   }
 
-  /// Of the positions, in the truth's world, m.
+  /// Of the positions, in the world as it began, m.
   double worst_error(const std::vector<Output>& outputs) const {
     double out = 0;
     std::optional<SE3> T_WR;
     for (const Output& o : outputs) {
       const SE3 truth = simulator_->walk().imu(simulator_->seconds_of(o.t));
-      if (!T_WR) T_WR = o.x.pose() * truth.inverse();
-      out = std::max(out, (o.x.p - (*T_WR * truth).p).norm());
+      const SE3 T_WI = SE3{o.R_LW.value_or(SO3()).inverse(), Eigen::Vector3d::Zero()} * o.x.pose();
+      if (!T_WR) T_WR = T_WI * truth.inverse();
+      out = std::max(out, (T_WI.p - (*T_WR * truth).p).norm());
     }
     return out;
   }
@@ -176,6 +181,7 @@ class FailingWalk {
         if (off) m.step = (now - *off).norm();
         off = now;
         m.s = simulator_->seconds_of(o.t);
+        for (const Event& event : o.events) out.events.emplace_back(m.s, event);
         out.moments.push_back(std::move(m));
       }
     };

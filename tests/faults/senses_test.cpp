@@ -101,6 +101,24 @@ TEST_F(Senses, AWrongMountOfTheLidarIsSaidWithTheSensesThatContradict) {
   }
 }
 
+TEST_F(Senses, WarningsGoOutWithTheOutputWhenTheyBecomeTrue) {
+  const Outcome o =
+      walk_->with({{FailureKind::freeze, Sensor::lidar, 6, 8, 0}},
+                  {li, {}, [](Robot& r) { r.lidar.T_imu_lidar.R = SO3::Exp(Eigen::Vector3d(0, 0.35, 0)) * r.lidar.T_imu_lidar.R; }});
+  std::size_t warnings = 0;
+  for (const Event& kept : o.statistics.events) {
+    if (row_of(kept.reason).severity == Severity::notice) continue;
+    const auto same = [&kept](const auto& out) { return out.second.reason == kept.reason && out.second.sensor == kept.sensor; };
+    const auto first = std::ranges::find_if(o.events, same);
+    if (kept.t > walk_->time(13.9)) continue;  // of finish()
+    ++warnings;
+    ASSERT_NE(first, o.events.end()) << text_of(kept);
+    EXPECT_NEAR(first->first, to_seconds(first->second.t - walk_->time(0)), 0.11) << text_of(kept) << ": with the next output";
+    EXPECT_GE(kept.count, first->second.count) << text_of(kept);
+  }
+  EXPECT_GE(warnings, 2u) << "the mount, and that the LiDAR froze";
+}
+
 TEST_F(Senses, AgreeWhereNothingIsWrong) {
   for (const auto& used : {std::optional<std::array<bool, sensor_count>>(), std::optional(li), std::optional(ki)}) {
     const Outcome o = walk_->with({}, {used, {}, {}});

@@ -1,41 +1,18 @@
-// A walk through the live runner: every message as it arrives, all threads at work. No test here depends on how fast the machine is: after
-// each message it is waited until the threads have nothing to do.
+// A walk through the live runner, beside the same offline.
 #include <algorithm>
 #include <gtest/gtest.h>
 #include <map>
 #include <thread>
 
-#include "apps/live/live_runner.hpp"
-#include "tests/faults/failing_walk.hpp"
+#include "kilvo/estimator/levelling.hpp"
+#include "tests/live/lived.hpp"
 
 namespace kilvo {
 namespace {
 
-struct Lived {
-  std::vector<Output> states, sweeps;
-  live::LiveStatistics statistics;
-};
-
-void push_and_wait(live::LiveRunner& runner, Measurement m) {
-  runner.push(std::move(m));
-  while (!runner.is_idle()) std::this_thread::yield();
-}
-
-Lived live_through(const test::FailingWalk& walk, std::vector<lab::Failure> failures) {
-  Lived out;
-  EstimatorConfig config = walk.settings().estimator;
-  config.wait_for_images = false;
-  Estimator estimator(walk.settings().robot, config, walk.used());
-  lab::LiveConfig live;
-  live.max_latency = 10;  // a slow machine gives nothing up
-  live::LiveRunner runner(
-      estimator, walk.settings().robot, config, walk.used(), live,
-      {[&out](Output o) { out.states.push_back(std::move(o)); }, [&out](Output o) { out.sweeps.push_back(std::move(o)); }});
-  walk.play(std::move(failures), [&runner](Measurement m) { push_and_wait(runner, std::move(m)); });
-  runner.stop();
-  out.statistics = runner.statistics();
-  return out;
-}
+using test::live_through;
+using test::Lived;
+using test::push_and_wait;
 
 std::vector<Output> offline(const test::FailingWalk& walk, std::vector<lab::Failure> failures) {
   std::vector<Output> out;
@@ -44,6 +21,11 @@ std::vector<Output> offline(const test::FailingWalk& walk, std::vector<lab::Fail
   Estimator estimator(walk.settings().robot, config, walk.used());
   walk.play(std::move(failures), [&](Measurement m) { estimator.push(std::move(m), out); });
   std::ranges::move(estimator.finish(), std::back_inserter(out));
+  Levelling levelling;
+  for (Output& o : out) {
+    levelling.add(o);
+    if (levelling.turn()) Levelling::apply(*levelling.turn(), o);
+  }
   return out;
 }
 
@@ -130,6 +112,30 @@ TEST(LiveWalk, ClocksThatGoBackAreFollowed) {
   EXPECT_LT(walk().worst_error(lived.states), 0.02);
   EXPECT_EQ(lived.statistics.warnings.size(), 1u);
   EXPECT_EQ(lived.statistics.clock_steps, 1u);
+  const std::vector<Event> events = lived.events(Reason::imu_clock_stepped);
+  ASSERT_EQ(events.size(), 1u) << "while it runs";
+  EXPECT_NEAR(events.front().value, 1, 0.01);
+}
+
+std::vector<Output> of_epoch(const std::vector<Output>& all, std::uint32_t epoch) {
+  std::vector<Output> out;
+  std::ranges::copy_if(all, std::back_inserter(out), [epoch](const Output& o) { return o.epoch == epoch; });
+  return out;
+}
+
+TEST(LiveWalk, PlayedASecondTimeBeginsAnew) {
+  const Lived lived = live_through(walk(), {}, 2);
+  const std::vector<Output> first = of_epoch(lived.states, 0), second = of_epoch(lived.states, 1);
+  ASSERT_EQ(first.size() + second.size(), lived.states.size()) << "two epochs";
+  ASSERT_GT(second.size(), 4400u) << "as the first time";
+  EXPECT_LT(second.front().t, walk().time(2)) << "the stamps are those of the recording";
+  EXPECT_LT(walk().worst_error(first), 0.02);
+  EXPECT_LT(walk().worst_error(second), 0.02);
+  const std::vector<Event> anew = lived.events(Reason::began_anew);
+  ASSERT_EQ(anew.size(), 1u);
+  EXPECT_NEAR(anew.front().value, 10, 0.2);
+  EXPECT_EQ(lived.seen.epochs, 2u);
+  EXPECT_FALSE(lived.seen.diverged);
 }
 
 TEST(LiveWalk, OutputsAreFiniteAndOrderedWhateverIsLost) {

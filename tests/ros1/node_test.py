@@ -17,6 +17,7 @@ from ros_world import Process, wait_until
 
 ARGUMENTS = argparse.Namespace()
 SECONDS = 8.0  # of the walk
+TWICE = 6.0    # of what is played again
 HALF = 5.0     # where the player dies and another one goes on
 
 
@@ -98,6 +99,7 @@ class Story:
             feet_config = ros_world.with_two_feet(self.config, os.path.join(os.path.dirname(self.bag), "feet.yaml"))
             body = ros_world.Body(os.path.join(os.path.dirname(self.bag), "robot.urdf"))
             self.two_feet = self.play_as("livox_ros_driver2", feet_config, body)
+            self.twice = {name: self.play_twice(name == "by the recording's clock") for name in ("by the wall", "by the recording's clock")}
             self.start_anew(self.config)
             self.pause_and_reset()
             self.without_master()
@@ -130,7 +132,15 @@ class Story:
         self.best, self.smooth = list(self.ears.best), list(self.ears.smooth)
         self.contacts, self.clouds, self.coloured = list(self.ears.contacts), list(self.ears.clouds), list(self.ears.coloured)
         self.ground = list(self.ears.ground)
+        wait_until(lambda: self.levelled_at() is not None, 3)
+        self.level_since = self.levelled_at()
         self.saved = call("/kilvo/save_map")
+
+    def levelled_at(self) -> float | None:
+        """When the world was levelled, s, as the diagnostics report it."""
+        status = self.ears.newest_status("estimator")
+        notes = [v.value for v in status.values if v.key == "notice" and v.value.startswith("levelled: ")]
+        return float(notes[0].split()[1]) if notes else None
 
     def heard_all(self) -> bool:
         count = len(self.ears.best)
@@ -160,6 +170,19 @@ class Story:
         wait_until(lambda: self.ears.newest_status("estimator") and "KILV" in self.ears.newest_status("estimator").message, 15 / ARGUMENTS.speed)
         player.wait()
         return {name: self.ears.newest_status(name) for name in ("estimator", "legs", "lidar", "camera")}
+
+    # The same recording again into a node that goes on; with use_sim_time as well.
+    def play_twice(self, sim_time: bool) -> dict:
+        self.master.proxy.setParam("/test", "/use_sim_time", sim_time)
+        self.start_anew(self.config)
+        first, transforms = len(self.ears.best), len(self.ears.transforms)
+        for _ in range(2):
+            ros_world.player(self.bag, ARGUMENTS.speed, 0, TWICE, sim_time).wait()
+            wait_until(self.heard_all)
+        wait_until(lambda: "epoch 2" in self.ears.newest_status("estimator").message, 5)
+        self.master.proxy.setParam("/test", "/use_sim_time", False)
+        return {"best": self.ears.best[first:], "transforms": self.ears.transforms[transforms:], "path": self.ears.paths[-1],
+                "status": self.ears.newest_status("estimator")}
 
     def without_master(self) -> None:
         call("/kilvo/reset")
@@ -285,17 +308,22 @@ class Node(unittest.TestCase):
     def test_the_ground_is_where_the_feet_are(self):
         ground = self.story.ground
         self.assertGreater(len(ground), 50 * (SECONDS - 3))
+        self.assertIsNotNone(self.story.level_since, "the world is levelled within the walk, and the diagnostics say when")
+        # Some of the states of the thread that runs ahead were on their way.
+        ground = [m for m in ground if m.header.stamp.to_sec() > self.story.level_since + 0.1]
+        self.assertGreater(len(ground), 50)
         self.assertEqual({m.header.frame_id for m in ground}, {"map"})
         self.assertEqual({len(m.poses) for m in ground}, {2})
         p = np.array([[[pose.position.x, pose.position.y, pose.position.z] for pose in m.poses] for m in ground])
         q = np.array([[pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w] for m in ground for pose in m.poses])
         self.assertGreater(rotations(q)[:, 2, 2].min(), np.cos(np.radians(5)), "the floor of the room is level")
-        # One plane, by less than a degree level: the world is as level as the accelerometer.
+        # One plane, level: gravity is known to a milliradian.
         places = p.reshape(-1, 3) - p.mean(axis=(0, 1))
         normal = np.linalg.svd(places, full_matrices=False)[2][2]
         off = np.abs(places @ normal)
         print(f"ground: {1000 * np.median(off):.1f} mm beside one plane (median), {1000 * off.max():.1f} at the most")
         self.assertLess(off.max(), 0.005)
+        self.assertGreater(abs(normal[2]), np.cos(0.01))
         self.assertGreater(np.linalg.norm(p[:, 0] - p[:, 1], axis=1).min(), 0.1, "the feet stand side by side")
 
     def test_listens_to_livox_and_to_compressed_images(self):
@@ -333,6 +361,32 @@ class Node(unittest.TestCase):
         p, _ = poses([anew])
         self.assertLess(np.linalg.norm(p[0]), 0.05)
         self.assertLess(stamps([anew])[0], stamps(self.story.best)[-1], "of the same recording, from its start")
+
+    def test_a_recording_played_again_begins_anew(self):
+        for name, again in self.story.twice.items():
+            t, (p, R) = stamps(again["best"]), poses(again["best"])
+            back = np.flatnonzero(np.diff(t) < 0)
+            self.assertEqual(len(back), 1, f"{name}: once, to the recording's stamps")
+            begin = back[0] + 1
+            self.assertLess(np.linalg.norm(p[begin]), 0.05, name)
+            for i, j in ((0, begin - 1), (begin, len(t) - 1)):
+                a, b = (int(np.argmin(np.abs(self.truth_t - t[n]))) for n in (i, j))
+                error = np.linalg.norm(R[i].T @ (p[j] - p[i]) - self.truth_R[a].T @ (self.truth_p[b] - self.truth_p[a]))
+                print(f"played again {name}: {j - i} poses, end-to-end error {1000 * error:.1f} mm")
+                self.assertGreater(j - i, 2000, name)
+                self.assertLess(error, 0.05, name)
+            tf = np.array([m.transforms[0].header.stamp.to_nsec() for m in again["transforms"]])
+            self.assertEqual(np.count_nonzero(np.diff(tf) < 0), 1, name)
+            self.assertLess(tf[-1] - t[-1], 2e8, name)
+            way = np.array([m.header.stamp.to_nsec() for m in again["path"].poses])
+            self.assertTrue(np.all(np.diff(way) > 0), f"{name}: of the second time alone")
+            status = again["status"]
+            values = {v.key: v.value for v in status.values}
+            self.assertEqual(values["epoch"], "2", name)
+            self.assertTrue(any(v.key == "warning" and v.value.startswith("began_anew: ") for v in status.values), status.values)
+            self.assertIn("the time went back by", status.message)
+            # Of the second time: at error, since the player has ended, and nothing that the first time left.
+            self.assertNotIn("diverged", status.message, name)
 
     def test_lives_without_its_master_and_ends_when_asked(self):
         self.assertTrue(self.story.goes_on)

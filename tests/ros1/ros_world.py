@@ -94,10 +94,10 @@ class Master(Process):
         return {name for name, nodes in self.proxy.getSystemState("/test")[2][0] if "/kilvo" in nodes}
 
 
-def player(bag: str, speed: float, start: float = 0, seconds: float | None = None) -> Process:
-    """Plays as fast as it was recorded, times `speed`. It waits a little so that all are connected."""
+def player(bag: str, speed: float, start: float = 0, seconds: float | None = None, clock: bool = False) -> Process:
+    """Plays as fast as it was recorded, times `speed`. It waits a little so that all are connected. `clock`: it tells what time it is."""
     length = [] if seconds is None else ["-u", str(seconds)]
-    return Process("rosbag", "play", "-q", "-d", "1.0", "-r", str(speed), "-s", str(start), *length, bag)
+    return Process("rosbag", "play", "-q", "-d", "1.0", "-r", str(speed), "-s", str(start), *length, *(["--clock"] if clock else []), bag)
 
 
 def png(height: int, width: int, rgb: bytes) -> bytes:
