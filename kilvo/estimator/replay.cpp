@@ -38,8 +38,10 @@ void Replay::inflate_for_jump(ImuInterval& interval, const ImuSample& a, const I
   constexpr double gyro = 3, accel = 100;  // rad/s, m/s^2
   const double dt = to_seconds(b.t - a.t), turned = (b.gyro - a.gyro).norm(), pushed = (b.accel - a.accel).norm();
   const auto scale = [dt](double jump, double noise) { return jump * jump * dt / (noise * noise); };
-  if (turned > gyro) interval.gyro_scale = std::max(interval.gyro_scale, scale(turned, config_.noise.gyro));
-  if (pushed > accel) interval.accel_scale = std::max(interval.accel_scale, scale(pushed, config_.noise.accel));
+  if (turned <= gyro && pushed <= accel) return;
+  // A sample that says such a thing of the one is not to be believed of the other.
+  interval.gyro_scale = std::max(interval.gyro_scale, scale(turned, config_.noise.gyro));
+  interval.accel_scale = std::max(interval.accel_scale, scale(pushed, config_.noise.accel));
 }
 
 bool Replay::is_blind(Time begin, Time end) const {
