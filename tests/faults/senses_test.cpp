@@ -134,6 +134,26 @@ TEST(ClippedAccelerometer, NeedsNoSearchAndCostsLittle) {
   EXPECT_LT(cut.rms_error(), 1.5 * whole.rms_error());
 }
 
+// Sweeps of so few points that they hold nothing: they are as if they had not come, and the ground under the feet is told by the map alone.
+TEST_F(Senses, SweepsOfAFewPointsCarryNothing) {
+  const auto thinned = [](Measurement& m, double s) {
+    auto* scan = std::get_if<LidarScan>(&m);
+    if (scan == nullptr || s < 6 || s > 10) return true;
+    std::vector<LidarPoint> few;
+    for (std::size_t i = 0; i < scan->points.size(); i += 200) few.push_back(scan->points[i]);
+    scan->points = std::move(few);
+    return true;
+  };
+  const Outcome few = walk_->with({}, {{}, thinned, {}, {}}), none = walk_->with({{FailureKind::drop, Sensor::lidar, 6.1, 10.1}});
+  const double error = few.worst(&Moment::error, 6.5, 9.9), sigma = few.worst(&Moment::sigma, 6.5, 9.9);
+  std::printf("20 points in a sweep: worst %.2f mm, none %.2f mm; sigma %.2f mm, none %.2f mm\n", 1e3 * error,
+              1e3 * none.worst(&Moment::error, 6.5, 9.9), 1e3 * sigma, 1e3 * none.worst(&Moment::sigma, 6.5, 9.9));
+  EXPECT_EQ(few.modality_at(8), Modality::ki);
+  EXPECT_NEAR(error, none.worst(&Moment::error, 6.5, 9.9), 0.001);
+  EXPECT_NEAR(sigma, none.worst(&Moment::sigma, 6.5, 9.9), 0.1 * sigma);
+  EXPECT_LT(few.worst(&Moment::sigmas, 6.5, 14), 4.0);
+}
+
 // A running robot whose torso rings hard at each touchdown; the range of its IMU is not given.
 TEST(ClippedAccelerometer, AtThreeGInARunCostsLittleAndTheGyroIsTrusted) {
   const auto running = [](const char* what, double range) {
