@@ -90,8 +90,7 @@ std::optional<VisualPipeline::Fault> VisualPipeline::fault_of(const CameraImage&
   if (picture.channels != 1 && picture.channels != 3) return Fault{Reason::image_channels, {}};
   const std::size_t values =
       static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height) * static_cast<std::size_t>(picture.channels);
-  if (picture.pixels.size() == values) return std::nullopt;
-  return Fault{Reason::image_cut, {}};
+  return picture.pixels.size() == values ? std::nullopt : std::optional(Fault{Reason::image_cut, {}});
 }
 
 std::optional<Reason> VisualPipeline::refuses(Time image) const {

@@ -81,6 +81,7 @@ class VisualPipeline {
   void restart_mount_check();
   /// The map begins anew.
   void forget_map();
+  const VisualMap& map() const { return map_; }
 
  private:
   struct Work;  // of the image that is registered

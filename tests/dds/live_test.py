@@ -105,7 +105,7 @@ class LiveTest(unittest.TestCase):
         self.assertGreater(heard["contacts"], 300)
         self.assertGreater(heard["diagnostics"], 3)
         self.assertGreater(heard["paths"], 1)
-        self.assertLess(self.error_of("walk.tum"), 0.02)
+        self.assertLess(self.error_of("walk.tum"), 0.0015)
         self.assertIn("KILV", live.said().replace("KIL (", "KILV ("))
 
     def test_b_peers_die_come_back_and_disturb(self):

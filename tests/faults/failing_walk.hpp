@@ -36,7 +36,8 @@ class Recorded final : public MeasurementSource {
 struct Moment {
   double s = 0;  // since the beginning of the walk
   double error = 0, sigma = 0, sigmas = 0, tilt_sigmas = 0;
-  double step = 0;  // how far the estimate moved beyond the truth since the moment before, m
+  double accel_bias = 0;  // m/s^2
+  double step = 0;        // how far the estimate moved beyond the truth since the moment before, m
   Modality modality{};
   Reason cause = Reason::start;
 };
@@ -93,16 +94,15 @@ struct Changes {
   std::optional<std::array<bool, sensor_count>> used = {};
   std::function<bool(Measurement&, double s)> edit = {};  // `s`: of arrival; false: it does not arrive
   std::function<void(Robot&)> robot = {};
+  std::function<double(double s)> where = {};  // the walk was there at the time `s` of the stamps; else at `s`
 };
 
 class FailingWalk {
  public:
-  FailingWalk(const std::string& name, std::uint64_t seed, double seconds, bool camera = false, double accel_range = 160,
-              double accel_bias_sigma = lab::ImuModel().accel_bias_sigma) {
+  FailingWalk(const std::string& name, std::uint64_t seed, double seconds, bool camera = false,
+              const std::function<void(lab::SimulatorConfig&)>& edit = {}) {
     lab::SimulatorConfig config = small(seconds);
     config.seed = seed;
-    config.imu.accel_bias_sigma = accel_bias_sigma;
-    config.imu.accel_range = accel_range;
     config.lidar.points = 4000;
     config.joints.delivery.rate = 500;
     config.camera.width = 160;
@@ -111,6 +111,7 @@ class FailingWalk {
     config.camera.cx = 80.3;
     config.camera.cy = 59.5;
     config.use[static_cast<std::size_t>(Sensor::camera)] = camera;
+    if (edit) edit(config);
     used_ = config.use;
     simulator_ = std::make_unique<lab::Simulator>(scenario(name), config);
     while (auto m = simulator_->next()) measurements_.emplace_back(simulator_->arrived(), *std::move(m));
@@ -120,7 +121,9 @@ class FailingWalk {
 
   const lab::Settings& settings() const { return settings_; }
   const std::array<bool, sensor_count>& used() const { return used_; }
-  SE3 truth(Time t) const { return simulator_->walk().imu(simulator_->seconds_of(t)); }
+  SE3 truth_at(Time t) const { return simulator_->walk().imu(simulator_->seconds_of(t)); }
+  const lab::Walk& truth() const { return simulator_->walk(); }
+  double seconds_of(Time t) const { return simulator_->seconds_of(t); }
   Time time(double seconds) const { return simulator_->start() + from_seconds(seconds); }
 
   /// Every measurement that arrives, in order.
@@ -171,7 +174,8 @@ class FailingWalk {
     std::optional<Eigen::Vector3d> off;
     const auto take = [&](const std::vector<Output>& outputs) {
       for (const Output& o : outputs) {
-        const SE3 truth = simulator_->walk().imu(simulator_->seconds_of(o.t));
+        const double s = simulator_->seconds_of(o.t);
+        const SE3 truth = simulator_->walk().imu(changes.where ? changes.where(s) : s);
         if (!T_WR) T_WR = o.x.pose() * truth.inverse();
         out.ordered = out.ordered && (!last || o.t > *last);
         out.finite = out.finite && is_finite({o.t, o.x, o.P});
@@ -180,7 +184,7 @@ class FailingWalk {
         const Eigen::Vector3d now = o.x.p - (*T_WR * truth).p;
         if (off) m.step = (now - *off).norm();
         off = now;
-        m.s = simulator_->seconds_of(o.t);
+        m.s = s;
         for (const Event& event : o.events) out.events.emplace_back(m.s, event);
         out.moments.push_back(std::move(m));
       }
@@ -202,6 +206,7 @@ class FailingWalk {
     m.sigmas = (e.array().abs() / o.P.diagonal().segment<3>(at::p).array().max(1e-12).sqrt()).maxCoeff();
     const Eigen::Vector3d r = (o.x.R.inverse() * truth.R).Log();
     m.tilt_sigmas = (r.array().abs() / o.P.diagonal().segment<3>(at::R).array().max(1e-12).sqrt()).maxCoeff();
+    m.accel_bias = o.x.ba.norm();
     m.modality = o.modality;
     m.cause = o.cause;
     return m;

@@ -61,13 +61,16 @@ TEST(Schedules, OfRandomFailuresAreOutlived) {
     EXPECT_TRUE(o.finite && o.ordered) << n << words(failures);
     ASSERT_FALSE(o.moments.empty());
     const test::Moment& last = o.moments.back();
-    // Of every output: where the estimate is wrong it says so. One in a thousand is a matter of luck.
+    // Of every output, position and attitude: where the estimate is wrong it says so. One in a thousand is a matter of luck.
     const auto lies = std::ranges::count_if(o.moments, [](const test::Moment& m) { return m.s > 1 && m.sigmas > 6; });
-    const bool good = last.error < 0.5 && last.sigmas < 4 && 1000 * lies < std::ssize(o.moments);
+    const auto tilted = std::ranges::count_if(o.moments, [](const test::Moment& m) { return m.s > 1 && m.tilt_sigmas > 6; });
+    const bool good = last.error < 0.5 && last.sigmas < 4 && last.tilt_sigmas < 4 && 1000 * lies < std::ssize(o.moments) &&
+                      1000 * tilted < std::ssize(o.moments);
     bad += good ? 0 : 1;
-    EXPECT_TRUE(good) << "schedule " << n << ": " << last.error << " m, " << last.sigmas << " sigmas at the end, " << lies << " of "
-                      << o.moments.size() << " outputs beyond six sigmas (" << o.worst(&test::Moment::sigmas, 1, seconds)
-                      << "):" << words(failures);
+    EXPECT_TRUE(good) << "schedule " << n << ": " << last.error << " m, " << last.sigmas << " sigmas and " << last.tilt_sigmas
+                      << " of attitude at the end, " << lies << " and " << tilted << " of " << o.moments.size()
+                      << " outputs beyond six sigmas (" << o.worst(&test::Moment::sigmas, 1, seconds) << ", "
+                      << o.worst(&test::Moment::tilt_sigmas, 1, seconds) << "):" << words(failures);
   }
   std::printf("%d of %d schedules good\n", count - bad, count);
 }

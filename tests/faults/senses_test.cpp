@@ -19,6 +19,10 @@ using test::Outcome;
 
 constexpr std::array<bool, sensor_count> li = {true, false, true, false}, ki = {true, true, false, false};
 
+bool has(const Outcome& o, Reason r) {
+  return std::ranges::any_of(o.statistics.events, [r](const Event& e) { return e.reason == r; });
+}
+
 class Senses : public testing::Test {
  protected:
   static void SetUpTestSuite() { walk_ = std::make_unique<FailingWalk>("room", 1, 14); }
@@ -28,9 +32,6 @@ class Senses : public testing::Test {
     for (const auto& [cause, count] : o.statistics.sensors[static_cast<std::size_t>(s)].dropped)
       sum += cause == "before the start" ? 0 : count;
     return sum;
-  }
-  static bool has(const Outcome& o, Reason r) {
-    return std::ranges::any_of(o.statistics.events, [r](const Event& e) { return e.reason == r; });
   }
   static std::unique_ptr<FailingWalk> walk_;
 };
@@ -70,22 +71,32 @@ TEST_F(Senses, OnTheLegsAWrongAccelerationLeavesAnHonestEstimate) {
 TEST_F(Senses, ARecordingPlayedAgainIsAnotherEpoch) {
   const auto epochs = walk_->twice();
   ASSERT_EQ(epochs.size(), 2u);
-  EXPECT_LT(epochs[0].first, 0.03);
-  EXPECT_LT(epochs[1].first, 0.03);
+  std::printf("played again: worst error %.2f mm, then %.2f mm\n", 1e3 * epochs[0].first, 1e3 * epochs[1].first);
+  EXPECT_LT(epochs[0].first, 0.006);
+  EXPECT_LT(epochs[1].first, 0.006);
   EXPECT_LT(epochs[1].second, 2.0) << "the stamps are those of the recording";
 }
 
-// All sensors are covered for three seconds, and their clocks stand still: the robot is somewhere else at once.
+// All sensors are covered for four seconds, and their clocks stand still: the robot is somewhere else at once. That nobody can know until
+// sweeps have fitted nowhere for two seconds; from then on each output says so. (Not of the attitude: the IMU was never told of the
+// carrying.)
 TEST_F(Senses, ARobotThatWasCarriedAwayDoesNotSayThatItKnowsWhere) {
   const auto carried = [](Measurement& m, double s) {
     if (s >= 5 && s < 9) return false;
     if (s >= 9) std::visit([](auto& x) { x.t -= std::chrono::seconds(4); }, m);
     return true;
   };
-  const Outcome o = walk_->with({}, {li, carried, {}});
-  std::printf("carried: begun anew %d, sigma %.2f m\n", static_cast<int>(o.statistics.maps_begun_anew), o.worst(&Moment::sigma, 8.5, 10));
-  ASSERT_GT(o.statistics.maps_begun_anew, 0u);
-  EXPECT_GT(o.worst(&Moment::sigma, 8.5, 10), 3.0);
+  const auto where = [](double s) { return s < 5 ? s : s + 4; };
+  const Outcome o = walk_->with({}, {li, carried, {}, where});
+  ASSERT_EQ(o.statistics.maps_begun_anew, 1u);
+  const auto anew = std::ranges::find(o.statistics.events, Reason::map_begun_anew, &Event::reason);
+  ASSERT_NE(anew, o.statistics.events.end());
+  const double from = walk_->seconds_of(anew->t) + 0.1;
+  std::printf("carried: error %.2f m, known at %.2f s: sigma %.2f m, at most %.1f sigmas\n", o.worst(&Moment::error, from, 20), from,
+              o.worst(&Moment::sigma, from, 20), o.worst(&Moment::sigmas, from, 20));
+  EXPECT_GT(o.worst(&Moment::error, from, 20), 0.5);
+  EXPECT_LT(from, 7.6);
+  EXPECT_LT(o.worst(&Moment::sigmas, from, 20), 4.0);
   EXPECT_TRUE(o.statistics.diverged);
 }
 
@@ -130,13 +141,120 @@ TEST_F(Senses, AgreeWhereNothingIsWrong) {
 TEST(ClippedAccelerometer, NeedsNoSearchAndCostsLittle) {
   const auto searches = [](const Outcome& o) { return o.statistics.searches; };
   const Outcome whole = FailingWalk("room", 4, 10).with({});
-  const Outcome cut = FailingWalk("room", 4, 10, false, 12).with({}, {{}, {}, [](Robot& r) { r.imu.accel_range = 12; }});
+  const Outcome cut = FailingWalk("room", 4, 10, false, [](lab::SimulatorConfig& c) {
+                        c.imu.accel_range = 12;
+                      }).with({}, {{}, {}, [](Robot& r) { r.imu.accel_range = 12; }});
   const std::uint64_t clipped = cut.statistics.health[0].clipped;
   std::printf("%d samples clipped: rms %.2f mm, %.2f mm without\n", static_cast<int>(clipped), 1e3 * cut.rms_error(),
               1e3 * whole.rms_error());
   EXPECT_GT(clipped, 5u);
   EXPECT_EQ(searches(cut), 0u);
   EXPECT_LT(cut.rms_error(), 1.5 * whole.rms_error());
+}
+
+// Sweeps of so few points that they hold nothing: they are as if they had not come, and the ground under the feet is told by the map alone.
+TEST_F(Senses, SweepsOfAFewPointsCarryNothing) {
+  const auto thinned = [](Measurement& m, double s) {
+    auto* scan = std::get_if<LidarScan>(&m);
+    if (scan == nullptr || s < 6 || s > 10) return true;
+    std::vector<LidarPoint> few;
+    for (std::size_t i = 0; i < scan->points.size(); i += 200) few.push_back(scan->points[i]);
+    scan->points = std::move(few);
+    return true;
+  };
+  const Outcome few = walk_->with({}, {{}, thinned, {}, {}}), none = walk_->with({{FailureKind::drop, Sensor::lidar, 6.1, 10.1}});
+  const double error = few.worst(&Moment::error, 6.5, 9.9), sigma = few.worst(&Moment::sigma, 6.5, 9.9);
+  std::printf("20 points in a sweep: worst %.2f mm, none %.2f mm; sigma %.2f mm, none %.2f mm\n", 1e3 * error,
+              1e3 * none.worst(&Moment::error, 6.5, 9.9), 1e3 * sigma, 1e3 * none.worst(&Moment::sigma, 6.5, 9.9));
+  EXPECT_EQ(few.modality_at(8), Modality::ki);
+  EXPECT_NEAR(error, none.worst(&Moment::error, 6.5, 9.9), 0.001);
+  EXPECT_NEAR(sigma, none.worst(&Moment::sigma, 6.5, 9.9), 0.1 * sigma);
+  EXPECT_LT(few.worst(&Moment::sigmas, 6.5, 14), 4.0);
+}
+
+// A running robot whose torso rings hard at each touchdown; the range of its IMU is not given.
+TEST(ClippedAccelerometer, AtThreeGInARunCostsLittleAndTheGyroIsTrusted) {
+  const auto running = [](const char* what, double range) {
+    const FailingWalk walk("run", 4, 10, false, [range](lab::SimulatorConfig& c) {
+      c.wear.impact = 45;
+      c.imu.accel_range = range;
+    });
+    const Outcome o = walk.with({}, {{}, {}, [](Robot& r) { r.imu.accel_range = r.imu.gyro_range = 0; }, {}});
+    std::printf("%s: %d samples clipped, rms %.2f mm\n", what, static_cast<int>(o.statistics.health[0].clipped), 1e3 * o.rms_error());
+    EXPECT_EQ(o.statistics.searches, 0u) << what;
+    EXPECT_FALSE(has(o, Reason::gyro_clipped)) << what;
+    return o;
+  };
+  const Outcome whole = running("whole", 160);
+  EXPECT_EQ(whole.statistics.health[0].clipped, 0u);
+  for (const Outcome& cut : {running("3 g", 3 * 9.8), running("2 g", 2 * 9.80665)}) {
+    EXPECT_GT(cut.statistics.health[0].clipped, 40u);
+    EXPECT_LT(cut.rms_error(), 1.5 * whole.rms_error());
+  }
+}
+
+// The first sample at the end of a range that is not given: a truth that is 29.4 m/s^2 or 250 degrees a second away from what it says.
+TEST_F(Senses, OneClippedSampleIsSeenAndCostsLittle) {
+  const auto free = [](Robot& r) { r.imu.accel_range = r.imu.gyro_range = 0; };
+  for (const bool of_gyro : {false, true}) {
+    const auto clip = [of_gyro, n = 0](Measurement& m, double) mutable {
+      auto* imu = std::get_if<ImuSample>(&m);
+      if (imu == nullptr || ++n != 1600) return true;
+      (of_gyro ? imu->gyro.z() : imu->accel.x()) = of_gyro ? 250 * M_PI / 180 : 29.4;
+      return true;
+    };
+    for (const bool with_legs : {true, false}) {
+      const std::optional<std::array<bool, sensor_count>> used = with_legs ? std::nullopt : std::optional(li);
+      const Outcome whole = walk_->with({}, {used, {}, free, {}}), o = walk_->with({}, {used, clip, free, {}});
+      const double as_usual = whole.worst(&Moment::error, 0, 14);
+      std::printf(
+          "one sample of the %s clipped, %s: worst %.2f mm, %.2f mm after 0.3 s, %.2f mm without; %.1f sigmas, bias %.3f m/s^2, %d "
+          "searches\n",
+          of_gyro ? "gyro" : "accelerometer", with_legs ? "KIL" : "LI", 1e3 * o.worst(&Moment::error, 0, 14),
+          1e3 * o.worst(&Moment::error, 8.3, 14), 1e3 * as_usual, o.worst(&Moment::sigmas, 0, 14), o.worst(&Moment::accel_bias, 5, 14),
+          static_cast<int>(o.statistics.searches));
+      EXPECT_EQ(o.statistics.health[0].clipped, 1u);
+      EXPECT_TRUE(has(o, of_gyro ? Reason::gyro_clipped : Reason::accel_clipped));
+      // Without legs nothing tells of a velocity that is wrong by 0.15 m/s before the next sweep.
+      EXPECT_LT(o.worst(&Moment::error, 0, 14), as_usual + (with_legs ? 0.003 : 0.015));
+      EXPECT_LT(o.worst(&Moment::error, 8.3, 14), as_usual + 0.001);
+      EXPECT_LT(o.worst(&Moment::sigmas, 0, 14), 4.0);
+      EXPECT_LT(o.worst(&Moment::accel_bias, 5, 14), 0.2);
+      if (with_legs && !of_gyro) {
+        EXPECT_EQ(o.statistics.searches, 0u);
+      }
+    }
+  }
+}
+
+// It is told with its reason, sensor by sensor, what came before an IMU that never came; and no more of it waits than a few seconds.
+TEST_F(Senses, WithoutAnyImuMessageAllElseIsDroppedAndTold) {
+  Estimator estimator(walk_->settings().robot, walk_->settings().estimator, walk_->used());
+  std::array<std::uint64_t, sensor_count> came{};
+  std::size_t outputs = 0;
+  const auto waiting = [&](std::size_t s) {
+    std::uint64_t out = came[s];
+    for (const auto& [cause, count] : estimator.statistics().sensors[s].dropped) out -= count;
+    return out;
+  };
+  constexpr std::size_t legs = 1, lidar = 2;
+  std::uint64_t most_scans = 0, most_legs = 0;
+  walk_->play({{FailureKind::drop, Sensor::imu, 0, std::numeric_limits<double>::infinity()}}, [&](Measurement m) {
+    ++came[static_cast<std::size_t>(sensor_of(m))];
+    outputs += estimator.push(std::move(m)).size();
+    most_scans = std::max(most_scans, waiting(lidar));
+    most_legs = std::max(most_legs, waiting(legs));
+  });
+  outputs += estimator.finish().size();
+  EXPECT_EQ(outputs, 0u);
+  EXPECT_LE(most_scans, 40u) << "3 s and what may be late";
+  EXPECT_LE(most_legs, 2000u);
+  for (const std::size_t s : {legs, lidar}) {
+    EXPECT_GT(came[s], 100u);
+    EXPECT_EQ(waiting(s), 0u) << "all of it is accounted for";
+  }
+  for (const char* said : {"legs: 5500 messages could not be used: no IMU", "lidar: 110 messages could not be used: no IMU"})
+    EXPECT_THAT(warnings_of(estimator.statistics()), testing::Contains(said));
 }
 
 }  // namespace

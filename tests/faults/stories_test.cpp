@@ -34,10 +34,12 @@ class Faults : public testing::Test {
     std::printf("%-22s", what);
     for (const std::string& c : o.changes()) std::printf(" %s", c.c_str());
     std::printf(
-        "  error %.3f m, %.1f sigmas, sigma %.3f m, rotation %.1f sigmas (at %.2f s); at the end %.3f m; searched %d found %d anew %d\n",
-        o.worst(&Moment::error, from, until), o.worst(&Moment::sigmas, from, until), o.worst(&Moment::sigma, from, until),
-        o.worst(&Moment::tilt_sigmas, from, until), o.when_worst(&Moment::tilt_sigmas, from, until), o.moments.back().error,
-        static_cast<int>(o.statistics.searches), static_cast<int>(o.statistics.found), static_cast<int>(o.statistics.maps_begun_anew));
+        "  error %.4f m, %.1f sigmas (at %.2f s), sigma %.3f m, rotation %.1f sigmas (at %.2f s); at the end %.4f m; searched %d found %d "
+        "anew %d\n",
+        o.worst(&Moment::error, from, until), o.worst(&Moment::sigmas, from, until), o.when_worst(&Moment::sigmas, from, until),
+        o.worst(&Moment::sigma, from, until), o.worst(&Moment::tilt_sigmas, from, until), o.when_worst(&Moment::tilt_sigmas, from, until),
+        o.moments.back().error, static_cast<int>(o.statistics.searches), static_cast<int>(o.statistics.found),
+        static_cast<int>(o.statistics.maps_begun_anew));
   }
 
   static std::unique_ptr<FailingWalk> walk_;
@@ -93,7 +95,7 @@ TEST_F(Faults, OneSensorLostForSixSeconds) {
   const Outcome lidar = with({{FailureKind::drop, Sensor::lidar, 6, 12}});
   say("lidar 6 s", lidar, 6, 14);
   EXPECT_THAT(lidar.changes(), testing::ElementsAre("KIL", "KI", "KIL"));
-  EXPECT_LT(lidar.worst(&Moment::error, 6, 14), 0.036);
+  EXPECT_LT(lidar.worst(&Moment::error, 6, 14), 0.015);
 }
 
 TEST_F(Faults, FrozenSensorsAreLost) {
@@ -116,7 +118,8 @@ TEST_F(Faults, OneWrongSampleOfTheImuIsOutlived) {
   for (const double amount : {3.0, 10.0}) {
     const Outcome o = with({{FailureKind::noise, Sensor::imu, 6, 6.004, amount}});
     say("one wrong IMU sample", o, 6, 14);
-    EXPECT_LT(o.worst(&Moment::error, 7, 14), 0.02) << amount;
+    EXPECT_LT(o.worst(&Moment::error, 7, 14), 0.009) << amount;
+    EXPECT_LT(o.worst(&Moment::sigmas, 6, 14), 4.0) << amount;
   }
 }
 
@@ -150,6 +153,8 @@ TEST_F(Faults, AVibrationFasterThanTheImuIsBorne) {
   say("vibration", o, 4, 14);
   EXPECT_THAT(o.changes(), testing::ElementsAre("KIL"));
   EXPECT_LT(o.rms_error(), 3 * with({}).rms_error());
+  // In its first second it is not known yet how much noisier the samples have become.
+  EXPECT_LT(o.worst(&Moment::sigmas, 5, 14), 4.0);
 }
 
 TEST_F(Faults, SweepsThatContradictTheMapAreRefused) {
@@ -169,7 +174,7 @@ TEST_F(Faults, AClockAheadOfTheImuIsMeasuredAndItsSensorNotUsed) {
     const StreamHealth& h = o.statistics.health[static_cast<std::size_t>(sensor)];
     EXPECT_GT(h.off_clock, 50u);
     EXPECT_NEAR(h.clock_offset, 0.3, 0.02);
-    EXPECT_LT(o.worst(&Moment::error, 6, 14), 0.039);
+    EXPECT_LT(o.worst(&Moment::error, 6, 14), 0.018);
     EXPECT_THAT(warnings_of(o.statistics), testing::Contains(testing::HasSubstr("ms ahead of the IMU")));
   }
 }
@@ -246,7 +251,7 @@ TEST_F(Faults, ASensorThatComesLateOrNever) {
       const Modality without = sensor == Sensor::legs ? Modality::li : Modality::ki;
       EXPECT_EQ(o.modality_at(4), without);
       EXPECT_EQ(o.modality_at(13), end > 10 ? without : Modality::kil);
-      EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.039);
+      EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.018);
     }
   }
 }

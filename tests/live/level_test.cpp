@@ -35,7 +35,7 @@ Output as_it_began(Output o) {
 class LevelLive : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    walk_ = std::make_unique<test::FailingWalk>("room", 1, 26, false, 160, 0.0);
+    walk_ = std::make_unique<test::FailingWalk>("room", 1, 26, false, [](lab::SimulatorConfig& c) { c.imu.accel_bias_sigma = 0; });
     lived_ = test::live_through(*walk_, {}, 1, [](Measurement& m) {
       if (auto* imu = std::get_if<ImuSample>(&m)) imu->accel.x() += bias;
     });
@@ -44,7 +44,7 @@ class LevelLive : public testing::Test {
   static std::vector<lab::PosePair> pairs(bool level) {
     std::vector<lab::PosePair> out;
     for (const Output& o : lived_.states) {
-      if (o.R_LW) out.push_back({o.t, (level ? o : as_it_began(o)).x.pose(), walk_->truth(o.t)});
+      if (o.R_LW) out.push_back({o.t, (level ? o : as_it_began(o)).x.pose(), walk_->truth_at(o.t)});
     }
     return out;
   }

@@ -271,7 +271,7 @@ class Node(unittest.TestCase):
             self.assertLess(np.median(turned), 0.05)
             self.assertGreater(np.abs(np.median(np.linalg.norm(v, axis=1))), 0.05, "it walks")
 
-    def test_ends_within_five_centimetres_of_the_truth(self):
+    def test_ends_within_two_millimetres_of_the_truth(self):
         for messages in (self.story.best, self.story.smooth):
             t, (p, R) = stamps(messages), poses(messages)
             i, j = 0, len(t) - 1
@@ -281,7 +281,7 @@ class Node(unittest.TestCase):
             error = np.linalg.norm(estimated - true)
             print(f"end-to-end error {1000 * error:.1f} mm over {np.linalg.norm(true):.2f} m")
             self.assertGreater(np.linalg.norm(true), 0.5)
-            self.assertLess(error, 0.05)
+            self.assertLess(error, 0.002)
 
     def test_the_smooth_odometry_makes_no_step(self):
         t, (p, _) = stamps(self.story.smooth), poses(self.story.smooth)

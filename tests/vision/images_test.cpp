@@ -11,6 +11,7 @@
 #include "lab/settings/settings.hpp"
 #include "lab/simulation/description.hpp"
 #include "lab/simulation/failures.hpp"
+#include "tests/faults/failing_walk.hpp"
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo {
@@ -27,13 +28,15 @@ struct Drive {
   std::map<Modality, int> outputs;
   std::map<Modality, std::string> cause;  // the last
   std::size_t coloured = 0;
+  std::vector<std::pair<double, Modality>> modalities;  // by time, s
 };
 
 // Ten seconds through a room, seen by a camera of half size.
 class Images : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    const lab::SimulatorConfig config = test::seen_by_half_a_camera(10, 8000);
+    lab::SimulatorConfig config = test::seen_by_half_a_camera(10, 8000);
+    config.use[static_cast<std::size_t>(Sensor::legs)] = true;
     simulator_ = std::make_unique<lab::Simulator>(test::scenario("room"), config);
     settings_ = std::make_unique<lab::Settings>(
         lab::parse_settings(lab::simulated_config(config, "sim.urdf"), "simulated", std::string(KILVO_SOURCE_DIR) + "/config/robots"));
@@ -64,6 +67,7 @@ class Images : public testing::Test {
         sum += (o.x.p - (*T_WR * truth).p).squaredNorm();
         ++count;
         ++out.outputs[o.modality];
+        out.modalities.emplace_back(t, o.modality);
         out.cause[o.modality] = text_of(o.cause);
         out.coloured += o.coloured.size();
         if (!o.is_image) continue;
@@ -186,20 +190,54 @@ TEST_F(Images, ACameraTurnedByThreeDegreesIsSpokenOf) {
   }
 }
 
-// A camera that is described wrongly carries nothing once the robot walks. While it stands (the first third), patches fit at the wrong
+// A camera that is described wrongly carries nothing once the robot has walked for a second. While it stands, patches fit at the wrong
 // place as well.
 TEST_F(Images, OfAWronglyDescribedCameraCarryNothing) {
   const std::vector<std::pair<const char*, std::function<void(Robot&)>>> wrong = {
       {"cx and cy swapped", [](Robot& r) { std::swap(r.camera.cx, r.camera.cy); }},
       {"fx halved", [](Robot& r) { r.camera.fx /= 2; }},
       {"mount inverted", [](Robot& r) { r.camera.T_imu_camera = r.camera.T_imu_camera.inverse(); }}};
+  double walks = 0;
+  while (simulator_->walk().velocity(walks).norm() < 0.1) walks += 0.01;
   for (const auto& [what, mount] : wrong) {
-    const Drive d = drive(liv, {}, mount);
-    const auto liv_outputs = d.outputs.contains(Modality::liv) ? d.outputs.at(Modality::liv) : 0;
-    std::printf("%s: LIV in %d of %d outputs, error %.2f mm\n", what, liv_outputs, liv_outputs + d.outputs.at(Modality::li), 1e3 * d.error);
-    EXPECT_LT(liv_outputs, 0.7 * d.outputs.at(Modality::li)) << what;
-    EXPECT_LT(d.error, 0.01) << what;
+    for (const bool with_legs : {false, true}) {
+      const Drive d = drive({true, with_legs, true, true}, {}, mount);
+      double last = 0;
+      for (const auto& [t, modality] : d.modalities) last = has_camera(modality) ? t : last;
+      std::printf("%s: %s until %.2f s, walking from %.2f s; error %.2f mm\n", what, with_legs ? "KILV" : "LIV", last, walks,
+                  1e3 * d.error);
+      EXPECT_LT(last, walks + 1) << what;
+      EXPECT_LT(d.error, 0.01) << what;
+    }
   }
+}
+
+// Images that are turned by three degrees for ten seconds: the mount is doubted, and ten seconds after that the camera is tried again.
+TEST(Camera, ThatWasTurnedAndIsRightAgainIsUsedAgain) {
+  const test::FailingWalk walk("room", 1, 19, true);
+  constexpr int shift = 5;  // of 160 pixels, at 85 pixels a radian
+  const auto turned = [](Measurement& m, double s) {
+    auto* image = std::get_if<CameraImage>(&m);
+    if (image == nullptr || s > 10) return true;
+    std::vector<std::uint8_t>& pixels = image->image.pixels;
+    std::rotate(pixels.begin(), pixels.begin() + shift * image->image.channels, pixels.end());
+    return true;
+  };
+  const test::Outcome o = walk.with({}, {liv, turned, {}, {}});
+  std::optional<double> doubted, back;
+  for (const Event& e : o.statistics.events) {
+    if (e.reason == Reason::camera_turned && !doubted) doubted = walk.seconds_of(e.t);
+  }
+  ASSERT_TRUE(doubted);
+  for (const test::Moment& m : o.moments) {
+    if (m.s > *doubted + 1 && has_camera(m.modality) && !back) back = m.s;
+  }
+  ASSERT_TRUE(back);
+  std::printf("doubted at %.2f s, used again from %.2f s\n", *doubted, *back);
+  EXPECT_LT(*doubted, 10);
+  EXPECT_NEAR(*back - *doubted, 10, 1);
+  EXPECT_EQ(o.moments.back().modality, Modality::liv);
+  EXPECT_LT(o.worst(&test::Moment::error, 0, 19), 0.01);
 }
 
 TEST_F(Images, ACoveredLensSaysNothingAndTeachesNothing) {
