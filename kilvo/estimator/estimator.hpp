@@ -81,6 +81,7 @@ class Estimator {
   void process_frames(Time until, std::vector<Output>& out);
   void process(const LidarScan& scan, Time begin, Time end, std::vector<Output>& out);
   void process(const CameraImage& image);
+  void doubt_acceleration(const LidarScan& scan, Time end, Estimate& prior, Registration& sweep);
   void refuse_sweep(Reason reason, const Estimate& prior, Time end);
 
   // What follows from either.

@@ -34,6 +34,8 @@ class History {
 
   /// The estimate of a time not before the base. What was passed on the way is in the trajectory.
   Estimate at(Time t);
+  /// What the accelerometer reported since the base is wrong. now() and closed() stay what they were.
+  void doubt_acceleration() { replay_.doubt_acceleration(base_); }
   /// Puts the poses from `e` to `until` into the trajectory.
   void record_from(const Estimate& e, Time until);
   /// How the IMU moved from `t` to the base: its poses at both, as the trajectory has them; the same when `t` is not before the base. None

@@ -1,5 +1,7 @@
 #include "kilvo/estimator/imu_watch.hpp"
 
+#include <algorithm>
+
 #include "kilvo/filter/update.hpp"
 
 namespace kilvo {
@@ -7,17 +9,20 @@ namespace {
 
 // theta_d: an acceleration so many standard deviations from its usual is an impact.
 constexpr double unusual_acceleration = 10;
+// Of each axis of an accelerometer for robots, m/s^2; on all three at once it is the square root of three times as much.
+constexpr double usual_range = 16 * standard_gravity;
 
 }  // namespace
 
 ImuWatch::ImuWatch(const ImuMount& mount, const InitialConfig& config)
-    : clipping_(mount.gyro_range, mount.accel_range), stationarity_(config.still_gyro, config.still_accel, unusual_acceleration) {}
+    : absurd_accel_(1.8 * std::max(mount.accel_range, usual_range)),
+      clipping_(mount.gyro_range, mount.accel_range),
+      stationarity_(config.still_gyro, config.still_accel, unusual_acceleration) {}
 
 std::optional<Reason> ImuWatch::prepare(ImuSample& s) {
-  // No robot is hit so hard, and no IMU for robots measures it, m/s^2.
-  constexpr double absurd_accel = 1000;
   s.accel *= accel_scale_;
-  if (s.accel.norm() > absurd_accel) return Reason::absurd_value;
+  // No IMU for robots measures it.
+  if (s.accel.norm() > absurd_accel_) return Reason::absurd_value;
   clipping_.mark(s);
   return std::nullopt;
 }

@@ -34,7 +34,7 @@ class ImuWatch {
   std::optional<Estimate> zero_velocity_update(const Estimate& e, const ImuSample& s, const UpdateConfig& config);
 
  private:
-  double accel_scale_ = 1;
+  double accel_scale_ = 1, absurd_accel_;  // -, m/s^2
   ClippingDetector clipping_;
   StationarityDetector stationarity_;
   std::optional<Time> last_update_;  // by standing still

@@ -24,6 +24,8 @@ class Recent {
   std::size_t size() const { return all_.size() - first_; }
   const T& back() const { return all_.back(); }
   const T& operator[](std::size_t i) const { return all_[first_ + i]; }
+  auto begin() { return all_.begin() + static_cast<std::ptrdiff_t>(first_); }
+  auto end() { return all_.end(); }
   auto begin() const { return all_.begin() + static_cast<std::ptrdiff_t>(first_); }
   auto end() const { return all_.end(); }
 

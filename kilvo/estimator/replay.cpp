@@ -252,6 +252,17 @@ const Estimate& Replay::nearest(Time t, const Estimate& oldest) const {
   return after == remembered_.begin() ? oldest : *(after - 1);
 }
 
+void Replay::doubt_acceleration(const Estimate& base) {
+  remembered_.clear();
+  taken_.clear();
+  usual_.accel_density2 = usual_.accel_bend2 = 0;  // they were of what is wrong
+  for (ImuSample& s : imu_) {
+    if (s.t <= base.t) continue;
+    s.accel = base.x.ba - base.x.R.inverse() * base.x.g;
+    s.accel_clipped = true;
+  }
+}
+
 void Replay::forget_before(Time t) {
   remembered_.clear();
   taken_.clear();

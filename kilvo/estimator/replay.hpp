@@ -68,6 +68,9 @@ class Replay {
   /// The last estimate remembered that is not later than `t`, else `oldest`.
   const Estimate& nearest(Time t, const Estimate& oldest) const;
 
+  /// What the accelerometer reported after the time of `base` is not believed: as if nothing had pushed the robot, nor was known to.
+  void doubt_acceleration(const Estimate& base);
+
   /// What is not needed by estimates of `t` and later; nothing that was remembered, for `t` has another estimate now.
   void forget_before(Time t);
   /// Becomes what `other` still knows that estimates of `t` and later need. Allocates only when it has never held so much.

@@ -42,13 +42,14 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
   // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
   // the sweep cancels to first order. What came since is propagated again.
   const Time middle = std::max(history_.base().t, end - (end - begin) / 2);
-  const Estimate prior = history_.at(middle);
+  Estimate prior = history_.at(middle);
   history_.record_from(prior, end);
   if (!lidar_.has_shape(end, prior)) return findings_.drop(Sensor::lidar, Reason::before_motion);
   Statistics& statistics = findings_.statistics();
   const PoseCovariance map_error = map_.error_at(prior.x.pose());
   const bool first = map_.surfaces().empty();
-  const Registration sweep = lidar_.measure(scan, end, prior, history_.trajectory(), map_.surfaces(), map_error, statistics.points);
+  Registration sweep = lidar_.measure(scan, end, prior, history_.trajectory(), map_.surfaces(), map_error, statistics.points);
+  if (sweep.refused == Reason::fits_nowhere) doubt_acceleration(scan, end, prior, sweep);
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
   if (sweep.refused) return refuse_sweep(*sweep.refused, prior, end);
@@ -86,6 +87,23 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
   outputs_.add_sweep(std::move(result));
   // While the legs are used it goes out with the next of their samples, which is not earlier than those that have gone.
   if (!status_.has_legs()) emit(history_.now(), out);
+}
+
+// The prior is uncertain for what the accelerometer reported: where that alone is wrong, the sweep fits where nothing has pushed the robot.
+void Estimator::doubt_acceleration(const LidarScan& scan, Time end, Estimate& prior, Registration& sweep) {
+  constexpr Duration longest = std::chrono::milliseconds(300);
+  if (!sweep.searched || end - history_.base().t > longest) return;
+  History doubted = history_;
+  doubted.doubt_acceleration();
+  const Estimate expected = doubted.at(prior.t);
+  doubted.record_from(expected, end);
+  PointDrops counted;
+  Registration again =
+      lidar_.measure(scan, end, expected, doubted.trajectory(), map_.surfaces(), map_.error_at(expected.x.pose()), counted);
+  if (again.refused || !again.carries) return;
+  history_ = std::move(doubted);
+  prior = expected;
+  sweep = std::move(again);
 }
 
 // A sweep that fits nowhere is not used; when that has lasted, the robot is taken to be outside of the map: it begins anew around it.

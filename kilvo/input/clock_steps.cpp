@@ -32,7 +32,8 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
   const Time now = t + offset;
   const bool near = !imu_ || (now > *imu_ - least_step && now < *imu_ + longest_interval);
   const bool alone_ahead = imu_ && now > *imu_ + least_step && has_run_ahead(now);
-  if (!alone_ahead && is_alone(now)) return Reason::time_jump;
+  const bool waits = must_wait(now);
+  if (!alone_ahead && waits) return Reason::time_jump;
   if (near && !alone_ahead) {
     if (imu_ && now > *imu_) period_ = std::min(now - *imu_, period_ + period_ / 8);
     // The most of lately: less, when the IMU comes late.
@@ -86,18 +87,15 @@ bool ClockSteps::is_sure() const {
   return alone || for_ + against_ > 0 || newest_there_ - first_there_ > patience;
 }
 
-// One stamp of the IMU lies ahead, and nobody else's time has gone on so far: it is wrong, unless the next one goes on from there.
-bool ClockSteps::is_alone(Time now) {
-  // Real IMUs come in bursts: what is nearer may be their way of speaking.
-  constexpr Duration usual = 2 * longest_interval;
-  const bool goes_on = suspect_ && now > *suspect_ && now - *suspect_ < longest_interval;
-  if (goes_on) return suspect_ = now, false;
-  if (!imu_ || now - *imu_ < usual) return suspect_.reset(), false;
-  for (std::size_t s = 0; s < sensor_count; ++s) {
-    if (newest_[s] && *newest_[s] - *imu_ > (now - *imu_) / 2) return suspect_.reset(), false;
-  }
+// A stamp of the IMU lies ahead by more than a missing sample or jitter makes: after a gap the next one goes on from there, else it is
+// wrong.
+bool ClockSteps::must_wait(Time now) {
+  constexpr Duration jitter = std::chrono::milliseconds(10);
+  went_on_ = false;
+  if (!imu_ || now - *imu_ <= std::max(jitter, 5 * period_ / 2)) return suspect_.reset(), false;
+  went_on_ = suspect_ && now > *suspect_ && now - *suspect_ < longest_interval;
   suspect_ = now;
-  return true;
+  return !went_on_;
 }
 
 // The IMU's time has gone on by more than that of the legs. In a gap they go on as well.
@@ -126,8 +124,9 @@ std::optional<Reason> ClockSteps::follow(Measurement& m) {
   const Time t = stamp_of(m);
   if (t < earliest || t > latest) return Reason::absurd_stamp;
   if (sensor == Sensor::imu) {
-    if (const auto fault = follow_imu(t)) return fault;
-    return put(m, s), std::nullopt;
+    const auto fault = follow_imu(t);
+    if (!fault || fault == Reason::time_jump) put(m, s);
+    return fault;
   }
   if (sensor == Sensor::legs) {
     const Time now = t + offset_[s];

@@ -14,8 +14,11 @@ namespace kilvo {
 class ClockSteps {
  public:
   /// Takes the measurements in the order of their arrival and puts each onto the time axis of the first. Says why one is not to be used:
-  /// the IMU's time has stepped, and whether it stays so is not known yet. Such a one is left as it is.
+  /// the IMU's time has stepped, and whether it stays so is not known yet. Such a one is left as it is. `time_jump`: the IMU's stamp lies
+  /// ahead of where the next one was due, and whether samples are missing or it is wrong is for the next to tell.
   std::optional<Reason> follow(Measurement& m);
+  /// The newest sample of the IMU goes on from the one before, of which follow() reported a `time_jump`: that one is right.
+  bool went_on() const { return went_on_; }
 
   /// How often all time went back by more than an estimator looks back: a recording is played again, or another one. What comes then has
   /// its own stamps.
@@ -29,7 +32,7 @@ class ClockSteps {
   std::optional<Reason> follow_imu(Time t);
   bool is_sure() const;
   bool has_run_ahead(Time now) const;
-  bool is_alone(Time now);
+  bool must_wait(Time now);
   void restart(Time imu);
   void put(Measurement& m, std::size_t s) const;
   void vote(std::size_t s, Time t);
@@ -42,11 +45,12 @@ class ClockSteps {
   std::array<std::optional<Time>, sensor_count> open_until_;
   std::array<std::optional<Time>, sensor_count> newest_;  // of each, with its offset
   std::optional<Time> imu_;                               // the newest, with its offset
-  std::optional<Time> suspect_;                           // a stamp of the IMU ahead of all others
-  Duration period_ = std::chrono::seconds(1);             // of the IMU, lately
-  std::optional<Time> legs_;                              // the newest, with its offset
-  std::optional<Time> legs_then_;                         // when the IMU spoke last
-  std::optional<Duration> legs_behind_;                   // by which they trail the IMU when it speaks
+  std::optional<Time> suspect_;                           // a stamp of the IMU ahead of what was due
+  bool went_on_ = false;
+  Duration period_ = std::chrono::seconds(1);  // of the IMU, lately
+  std::optional<Time> legs_;                   // the newest, with its offset
+  std::optional<Time> legs_then_;              // when the IMU spoke last
+  std::optional<Duration> legs_behind_;        // by which they trail the IMU when it speaks
   Duration legs_spacing_ = std::chrono::seconds(1);
   int elsewhere_ = 0;                    // IMU samples in a row of another time
   Time first_there_{}, newest_there_{};  // of them

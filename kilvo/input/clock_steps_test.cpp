@@ -17,22 +17,29 @@ struct Robot {
   ClockSteps clocks;
   Duration now = milliseconds(0);
   int refused = 0;
+  bool doubted = false;                                // the sample of the IMU before: the next one tells
   Duration worst_imu{}, worst_legs{}, worst_camera{};  // distance from the time of measurement
 
   void note(Measurement m, Duration truth, Duration& worst) {
-    if (clocks.follow(m)) {
+    const auto reason = clocks.follow(m);
+    if (sensor_of(m) == Sensor::imu) {
+      refused += doubted && !clocks.went_on() ? 1 : 0;
+      doubted = reason == Reason::time_jump;
+    }
+    if (reason && reason != Reason::time_jump) {
       ++refused;
       return;
     }
+    if (reason) return;
     const Duration off = stamp_of(m) - at(truth);
     worst = std::max(worst, off < Duration(0) ? -off : off);
   }
-  void walk(Duration how_long, Duration shift, Duration camera_shift) {
+  void walk(Duration how_long, Duration shift, Duration camera_shift, bool legs = true) {
     for (const Duration end = now + how_long; now < end; now += milliseconds(1)) {
       if (now % milliseconds(5) == Duration(0)) note(ImuSample{.t = at(now + shift)}, now, worst_imu);
       JointSample joints;
       joints.t = at(now - milliseconds(3) + shift);
-      note(joints, now - milliseconds(3), worst_legs);
+      if (legs) note(joints, now - milliseconds(3), worst_legs);
       if (now % milliseconds(100) == milliseconds(40)) {
         CameraImage image;
         image.t = at(now - milliseconds(40) + camera_shift);
@@ -190,14 +197,31 @@ TEST(ClockSteps, FollowAClockThatGoesAhead) {
 }
 
 TEST(ClockSteps, OneStampOfTheImuAheadOfAllOthersCostsOneSample) {
-  for (const int ms : {250, 500, 950}) {
-    SCOPED_TRACE(ms);
+  for (const int ms : {12, 20, 40, 80, 150, 250, 500, 950}) {
+    for (const bool legs : {true, false}) {
+      SCOPED_TRACE(testing::Message() << ms << " ms, legs " << legs);
+      Robot r;
+      r.walk(seconds(2), {}, {}, legs);
+      Measurement wrong = ImuSample{.t = at(r.now + milliseconds(ms))};
+      EXPECT_TRUE(r.clocks.follow(wrong).has_value());
+      r.now += milliseconds(1);
+      r.walk(seconds(2), {}, {}, legs);
+      EXPECT_EQ(r.refused, 0);
+      EXPECT_EQ(r.worst_imu, Duration(0));
+    }
+  }
+}
+
+// Samples are missing, as many stamps shake by 2 ms, and nobody else speaks.
+TEST(ClockSteps, GapsAndJitterOfAnImuAloneCostNothing) {
+  for (const int gap : {0, 20, 60, 100, 200, 400}) {
+    SCOPED_TRACE(gap);
     Robot r;
-    r.walk(seconds(2), {}, {});
-    Measurement wrong = ImuSample{.t = at(r.now + milliseconds(ms))};
-    EXPECT_TRUE(r.clocks.follow(wrong).has_value());
-    r.now += milliseconds(1);
-    r.walk(seconds(2), {}, {});
+    for (int i = 0; i < 400; ++i) {
+      r.now += milliseconds(i == 200 ? gap : 5);
+      const Duration jitter = milliseconds(i * 7 % 5 - 2);
+      r.note(ImuSample{.t = at(r.now + jitter)}, r.now + jitter, r.worst_imu);
+    }
     EXPECT_EQ(r.refused, 0);
     EXPECT_EQ(r.worst_imu, Duration(0));
   }

@@ -23,7 +23,18 @@ void InputQueue::push(Measurement m) {
     first_of_next_ = Held{std::move(m), off_clock};
     return;
   }
-  admit(std::move(m), off_clock);
+  if (s == Sensor::imu) settle_doubted();
+  if (off_clock == Reason::time_jump) {
+    doubted_ = std::move(m);
+  } else {
+    admit(std::move(m), off_clock);
+  }
+}
+
+// What the newest sample of the IMU says of the one before.
+void InputQueue::settle_doubted() {
+  if (auto before = std::exchange(doubted_, std::nullopt))
+    admit(std::move(*before), clock_steps_.went_on() ? std::nullopt : std::optional(Reason::time_jump));
 }
 
 void InputQueue::admit(Measurement m, std::optional<Reason> off_clock) {
@@ -48,6 +59,7 @@ double InputQueue::shift_by(Sensor s, double by) {
 }
 
 void InputQueue::end() {
+  if (doubted_) admit(*std::exchange(doubted_, std::nullopt), Reason::time_jump);
   timeline_.end();
   for (const Sensor jumped : timeline_.take_jumped()) refuse(jumped, Reason::time_jump);
 }

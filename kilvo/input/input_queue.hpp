@@ -52,6 +52,7 @@ class InputQueue {
 
  private:
   void admit(Measurement m, std::optional<Reason> off_clock);
+  void settle_doubted();
   void refuse(Sensor s, Reason r) { refused_.push_back({s, r}); }
 
   Robot robot_;
@@ -68,6 +69,7 @@ class InputQueue {
     std::optional<Reason> off_clock;
   };
   std::optional<Held> first_of_next_;
+  std::optional<Measurement> doubted_;  // of the IMU: the next one shows whether its stamp is right
 };
 
 }  // namespace kilvo

@@ -46,6 +46,37 @@ TEST(InputQueue, GivesMeasurementsInTheOrderOfTime) {
   EXPECT_TRUE(q.take_refused().empty());
 }
 
+// Sweeps come between them, twenty at a time arrive late together, forty are missing.
+TEST(InputQueue, SamplesOfTheImuThatComeInBurstsOrAfterAGapAreAllLetThrough) {
+  for (const int burst : {1, 4, 20}) {
+    InputQueue q = queue();
+    std::size_t sent = 0;
+    for (int i = 0; i < 400; ++i) {
+      if (i % burst == 0) {
+        for (int k = i; k < i + burst; ++k) {
+          if (k >= 200 && k < 240) continue;
+          q.push(imu_at(0.005 * k));
+          ++sent;
+        }
+      }
+      if (i % 20 == 10) q.push(scan_at(0.005 * i - 0.1)), ++sent;
+    }
+    q.end();
+    EXPECT_EQ(popped(q).size(), sent) << burst;
+    EXPECT_TRUE(q.take_refused().empty()) << burst;
+  }
+}
+
+TEST(InputQueue, OfTheImuOneStampAheadIsRefusedAndTheLastOneToo) {
+  InputQueue q = queue();
+  for (int i = 0; i < 100; ++i) q.push(imu_at(i == 50 || i == 99 ? 0.005 * i + 0.04 : 0.005 * i));
+  q.end();
+  EXPECT_EQ(popped(q).size(), 98u);
+  const auto refused = q.take_refused();
+  ASSERT_EQ(refused.size(), 2u);
+  EXPECT_EQ(refused[0].reason, Reason::time_jump);
+}
+
 TEST(InputQueue, NamesWhatItRefusesAndLetsTheRestThrough) {
   InputQueue q = queue();
   q.push(imu_at(0));

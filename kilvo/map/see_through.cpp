@@ -9,16 +9,24 @@
 namespace kilvo {
 namespace {
 
-// So many beams of a sweep are followed. A plane that so many passed through since points were found on it is gone: by level of the octree,
-// for beside an edge more beams of one sweep pass a large voxel's plane than a small one's.
-constexpr std::size_t most_beams = 64;
-constexpr std::array<float, 3> gone = {12, 6, 3};
+// So many beams of a sweep are followed, others each time; and so many more at most, in directions in which one of the last few sweeps
+// passed through a plane: what has left leaves more than one.
+constexpr std::size_t most_beams = 256, most_more = 512;
+constexpr std::uint32_t few = 6, long_ago = 50;
+// A plane that beams of so many sweeps passed through since points were found on it is gone.
+constexpr std::uint8_t gone = 5;
 
 }  // namespace
 
 void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const PointGroup> groups) {
+  ++sweep_;
   const std::size_t stride = std::max<std::size_t>(1, groups.size() / most_beams);
-  for (std::size_t i = beams_of_++ % stride; i < groups.size(); i += stride) trace(origin_W, groups[i].mean);
+  for (std::size_t i = sweep_ % stride; i < groups.size(); i += stride) trace(origin_W, groups[i].mean);
+  if (sweep_ - passed_last_ >= few) return;
+  std::size_t more = 0;
+  for (const PointGroup& g : groups) {
+    if (sweep_ - passed_in_[direction_cell(g.mean - origin_W)] < few && more++ < most_more) trace(origin_W, g.mean);
+  }
 }
 
 namespace {
@@ -41,6 +49,12 @@ bool passes(const Plane& plane, const Eigen::Vector3d& from, const Eigen::Vector
 }
 
 }  // namespace
+
+std::size_t VoxelMap::direction_cell(const Eigen::Vector3d& way) {
+  const Eigen::Vector3d d = (0.5 * direction_cells * (1 - 1e-9)) * (way.normalized().array() + 1);
+  const auto at = [&d](int i) { return static_cast<std::size_t>(d[i]); };
+  return at(0) + direction_cells * (at(1) + direction_cells * at(2));
+}
 
 // From one root voxel to the next, and from leaf to leaf only within those that hold something other than a plane that the beam does not
 // pass through.
@@ -82,7 +96,11 @@ bool VoxelMap::is_passed(std::uint32_t root, const Leaf& leaf, const Eigen::Vect
   const double before = node.plane.distance(from), behind = node.plane.distance(to);
   if (leaf_of(from + before / (before - behind) * (to - from)) != leaf) return false;
   last = index;
-  if (++node.against < gone[static_cast<std::size_t>(plane)]) return false;
+  // Beside an edge many beams of one sweep pass a plane, and the next sweep finds it again: that is worth no more beams.
+  if (node.passed_in == sweep_) return false;
+  if (node.against > 0 || sweep_ - node.passed_in > long_ago) passed_last_ = passed_in_[direction_cell(to - from)] = sweep_;
+  node.passed_in = sweep_;
+  if (++node.against < gone) return false;
   forget_plane(path, plane, root_centre(leaf));
   return true;
 }

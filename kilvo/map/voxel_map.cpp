@@ -40,7 +40,10 @@ void VoxelMap::Pool<T>::give_back(std::uint32_t i) {
   free.push_back(i);
 }
 
-VoxelMap::VoxelMap(const MapConfig& config) : config_(config), leaves_per_metre_((1 << depth) * (1.0 / config.voxel_size)) {}
+VoxelMap::VoxelMap(const MapConfig& config)
+    : config_(config),
+      leaves_per_metre_((1 << depth) * (1.0 / config.voxel_size)),
+      passed_in_(direction_cells * direction_cells * direction_cells) {}
 
 Eigen::Vector3d VoxelMap::root_centre(const Leaf& l) const {
   const auto coordinate = [this](std::int64_t v) { return (static_cast<double>(v >> depth) + 0.5) * config_.voxel_size; };

@@ -90,9 +90,10 @@ class VoxelMap {
   struct alignas(64) Node {
     Plane plane;
     bool is_plane = false;
+    std::uint8_t against = 0;  // sweeps with beams that passed through the plane, since points were found on it
     std::uint32_t epoch = 0;
     std::uint32_t children = none;  // index of its table of eight; none for leaves and undivided nodes
-    float against = 0;              // beams that passed through the plane since points were found on it
+    std::uint32_t passed_in = 0;    // the last of those sweeps
     double fitted_count = 0;        // points at the last fit
     Moments moments;
   };
@@ -131,6 +132,8 @@ class VoxelMap {
   using Path = std::array<std::uint32_t, depth + 1>;
   void trace(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
   bool is_passed(std::uint32_t root, const Leaf& leaf, const Eigen::Vector3d& from, const Eigen::Vector3d& to, std::uint32_t& last);
+  static constexpr std::size_t direction_cells = 8;  // along each side of the cube around all directions
+  static std::size_t direction_cell(const Eigen::Vector3d& way);
   void forget_plane(const Path& path, int level, const Eigen::Vector3d& origin);
   void free_children(Node& node);
   void erase_root(VoxelKey key);
@@ -143,7 +146,9 @@ class VoxelMap {
   Pool<Node> nodes_;
   Pool<Children> children_;
   std::size_t node_count_ = 0;
-  std::size_t beams_of_ = 0;  // see_through() calls, by which its beams rotate
+  std::uint32_t sweep_ = 1000;            // counts the calls of see_through()
+  std::uint32_t passed_last_ = 0;         // when a beam last passed through a plane
+  std::vector<std::uint32_t> passed_in_;  // the same by direction
   Eigen::Vector3d last_forget_ = Eigen::Vector3d::Zero();
 };
 

@@ -17,7 +17,8 @@ using test::FailingWalk;
 using test::Moment;
 using test::Outcome;
 
-constexpr std::array<bool, sensor_count> li = {true, false, true, false}, ki = {true, true, false, false};
+constexpr std::array<bool, sensor_count> li = {true, false, true, false}, ki = {true, true, false, false}, kil = {true, true, true, false},
+                                         liv = {true, false, true, true};
 
 bool has(const Outcome& o, Reason r) {
   return std::ranges::any_of(o.statistics.events, [r](const Event& e) { return e.reason == r; });
@@ -38,16 +39,60 @@ class Senses : public testing::Test {
 std::unique_ptr<FailingWalk> Senses::walk_;
 
 TEST_F(Senses, OneStampOfTheImuAheadCostsOneSample) {
-  for (const double ahead : {0.3, 0.6, 0.95}) {
-    for (const bool with_legs : {true, false}) {
+  const FailingWalk walk("room", 1, 6.5, true);
+  for (const double ahead : {0.02, 0.04, 0.08, 0.15, 0.22, 0.6, 0.95}) {
+    for (const auto& used : {kil, li, liv}) {
+      SCOPED_TRACE(testing::Message() << ahead << " s, legs " << used[1] << ", camera " << used[3]);
       const auto stamp = [ahead, n = 0](Measurement& m, double) mutable {
-        if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && ++n == 1600) imu->t += from_seconds(ahead);
+        if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && ++n == 1000) imu->t += from_seconds(ahead);
         return true;
       };
-      const Outcome o = walk_->with({}, {with_legs ? std::nullopt : std::optional(li), stamp, {}});
-      EXPECT_EQ(dropped(o, Sensor::imu), 1u) << ahead;
-      EXPECT_EQ(o.statistics.imu_outages, 0u) << ahead;
-      EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.01) << ahead;
+      const Outcome o = walk.with({}, {used, stamp, {}});
+      EXPECT_EQ(dropped(o, Sensor::imu), 1u);
+      EXPECT_EQ(o.statistics.imu_outages, 0u);
+      EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.01);
+      EXPECT_LT(o.worst(&Moment::sigmas, 1, 14), 4.0);
+    }
+  }
+}
+
+// What real IMUs do: stamps that shake, samples that are lost.
+TEST_F(Senses, JitterAndGapsOfTheImuCostNoSampleThatCame) {
+  const FailingWalk walk("room", 1, 6.5);
+  for (const double gap : {0.0, 0.02, 0.06, 0.09, 0.2}) {
+    SCOPED_TRACE(gap);
+    const auto shake = [gap, n = 0](Measurement& m, double s) mutable {
+      auto* imu = std::get_if<ImuSample>(&m);
+      if (imu == nullptr) return true;
+      imu->t += std::chrono::milliseconds(gap == 0 ? ++n * 7 % 5 - 2 : 0);
+      return s < 5 || s >= 5 + gap;
+    };
+    const Outcome o = walk.with({}, {li, shake, {}});
+    std::printf("gap of %.2f s: %.3f m, %.1f sigmas\n", gap, o.worst(&Moment::error, 0, 14), o.worst(&Moment::sigmas, 1, 14));
+    EXPECT_EQ(dropped(o, Sensor::imu), 0u);
+    EXPECT_LT(o.worst(&Moment::sigmas, 1, 14), 4.0);
+    EXPECT_LT(o.worst(&Moment::error, 5.5, 14), 0.03);
+  }
+}
+
+// Forty milliseconds of accelerations that nobody has felt, while the sweeps are good.
+TEST_F(Senses, ABurstOfWrongAccelerationsIsOutlivedWithSweeps) {
+  const FailingWalk walk("room", 1, 6.5);
+  // Those of 200 an IMU may measure: until the next sweep nothing tells.
+  for (const auto& [samples, accel] : {std::pair(8, 900.0), std::pair(8, 300.0), std::pair(8, 200.0), std::pair(40, 900.0)}) {
+    for (const int phase : {0, 5, 15}) {
+      SCOPED_TRACE(testing::Message() << samples << " samples of " << accel << " m/s^2, " << phase);
+      const auto hit = [phase, samples = samples, accel = accel, n = 0](Measurement& m, double) mutable {
+        auto* imu = std::get_if<ImuSample>(&m);
+        if (imu != nullptr && ++n > 1000 + phase && n <= 1000 + phase + samples) imu->accel.x() = accel;
+        return true;
+      };
+      const Outcome o = walk.with({}, {li, hit, {}});
+      std::printf("%d samples of %.0f m/s^2, %d: %.3f m, later %.3f m, %.1f sigmas\n", samples, accel, phase,
+                  o.worst(&Moment::error, 0, 14), o.worst(&Moment::error, 5.5, 14), o.worst(&Moment::sigmas, 1, 14));
+      EXPECT_LT(o.worst(&Moment::error, accel == 200 ? 5.5 : 1, 14), 0.1);
+      EXPECT_LT(o.worst(&Moment::sigmas, accel == 200 ? 5.5 : 1, 14), 4.0);
+      EXPECT_EQ(o.statistics.rollbacks, 0u);
     }
   }
 }
