@@ -1,6 +1,6 @@
-#include "kilvo/estimator/history.hpp"
-
 #include <gtest/gtest.h>
+
+#include "kilvo/estimator/history.hpp"
 
 namespace kilvo {
 namespace {
@@ -14,7 +14,7 @@ Estimate walking() {
   e.t = begin_time;
   e.x.v = {1, 0.5, 0};
   e.P.diagonal().setConstant(1e-4);
-  for (std::size_t side = 0; side < 2; ++side) begin_stance(e, side, {}, LegConfig());
+  for (std::size_t side = 0; side < 2; ++side) begin_stance(e, side, {.p = {0, 0, -0.7}, .v = {0, 0, 0}}, LegConfig());
   return e;
 }
 
@@ -24,7 +24,7 @@ TEST(History, RollsBackToTheLastGoodEstimateOfTodaysTime) {
   history.begin(walking(), std::nullopt);
   for (Duration t{}; t <= milliseconds(300); t += milliseconds(5)) {
     const bool is_wrong = t > milliseconds(200);
-    history.add({begin_time + t, {}, {is_wrong ? 400.0 : 0.0, 0, standard_gravity}});
+    history.add({begin_time + t, {0, 0, 0}, {is_wrong ? 400.0 : 0.0, 0, standard_gravity}});
     history.close(begin_time + t);
     if (!is_wrong) history.remember_good();
   }
@@ -55,7 +55,7 @@ TEST(History, RollsBackToTheLastGoodEstimateOfTodaysTime) {
 TEST(History, GoesOnAfterARollBack) {
   History history{EstimatorConfig()};
   history.begin(walking(), std::nullopt);
-  const auto sample = [](Duration t) { return ImuSample{begin_time + t, {}, {0, 0, standard_gravity}}; };
+  const auto sample = [](Duration t) { return ImuSample{begin_time + t, {0, 0, 0}, {0, 0, standard_gravity}}; };
   for (Duration t{}; t <= milliseconds(100); t += milliseconds(5)) {
     history.add(sample(t));
     history.close(begin_time + t);

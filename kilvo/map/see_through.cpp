@@ -9,9 +9,10 @@
 namespace kilvo {
 namespace {
 
-// So many beams of a sweep are followed, others each time; and so many more at most, in directions in which one of the last few sweeps
-// passed through a plane: what has left leaves more than one.
+// Beams of a sweep are followed, others each time; and more of them in directions in which one of the last few sweeps passed through a
+// plane: what has left leaves more than one. All together not further than so many metres, of which the first kind has a third.
 constexpr std::size_t most_beams = 256, most_more = 512;
+constexpr double most_way = 2500;
 constexpr std::uint32_t few = 6, long_ago = 50;
 // A plane that beams of so many sweeps passed through since points were found on it is gone.
 constexpr std::uint8_t gone = 5;
@@ -20,12 +21,22 @@ constexpr std::uint8_t gone = 5;
 
 void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const PointGroup> groups) {
   ++sweep_;
-  const std::size_t stride = std::max<std::size_t>(1, groups.size() / most_beams);
-  for (std::size_t i = sweep_ % stride; i < groups.size(); i += stride) trace(origin_W, groups[i].mean);
+  if (groups.empty()) return;
+  const std::size_t count = groups.size(), stride = std::max<std::size_t>(1, count / most_beams);
+  const std::size_t first = 7919 * static_cast<std::size_t>(sweep_) % count;  // anywhere: where the way does not do, each has its turn
+  double left = most_way;
+  const auto follow = [&](const Eigen::Vector3d& to) {
+    trace(origin_W, to);
+    left -= (to - origin_W).norm();
+  };
+  for (std::size_t i = 0; i < count && left > 2 * most_way / 3; i += stride) follow(groups[(first + i) % count].mean);
   if (sweep_ - passed_last_ >= few) return;
   std::size_t more = 0;
-  for (const PointGroup& g : groups) {
-    if (sweep_ - passed_in_[direction_cell(g.mean - origin_W)] < few && more++ < most_more) trace(origin_W, g.mean);
+  for (std::size_t i = 0; i < count && left > 0 && more < most_more; ++i) {
+    const Eigen::Vector3d& to = groups[(first + i) % count].mean;
+    if (sweep_ - passed_in_[direction_cell(to - origin_W)] >= few) continue;
+    follow(to);
+    ++more;
   }
 }
 
