@@ -173,7 +173,9 @@ std::vector<Nees> run_with_own_map(const lab::AnalyticRoomConfig& config) {
   lab::AnalyticRoom room(config);
   Robot robot;
   robot.lidar.T_imu_lidar = config.T_imu_lidar;
-  Estimator estimator(robot, {}, {true, false, true, false});
+  EstimatorConfig config_of_exact_mount;
+  config_of_exact_mount.lidar.mount_error = false;
+  Estimator estimator(robot, config_of_exact_mount, {true, false, true, false});
   std::optional<SE3> T_WR;  // the room in the estimator's world, by the first pose
   std::vector<Nees> out;
   const auto take = [&](const std::vector<Output>& outputs) {

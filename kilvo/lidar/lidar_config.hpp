@@ -15,6 +15,7 @@ struct LidarConfig {
   double weak_share = 0.002;
   double least_ratio = 0;
   bool recut = false;
+  bool mount_error = true;
 
   /// How far noise carries points of a surface beyond a voxel's face, m.
   double reach() const { return 3 * range_noise; }
@@ -32,7 +33,9 @@ struct LidarConfig {
         Field{"least_ratio", &LidarConfig::least_ratio, "-",
               "a scan that is flatter (smallest eigenvalue of the points' scatter over the largest) is not used, and the "
               "modality changes as if it were lost; 0: never"},
-        Field{"recut", &LidarConfig::recut, "-", "scans are cut anew so that each ends at an image; false: they are taken as they come"}};
+        Field{"recut", &LidarConfig::recut, "-", "scans are cut anew so that each ends at an image; false: they are taken as they come"},
+        Field{"mount_error", &LidarConfig::mount_error, "-",
+              "reported sigmas allow for a LiDAR that is not mounted quite as described; false: the mount is known exactly"}};
   }
 };
 

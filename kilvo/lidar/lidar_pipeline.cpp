@@ -163,7 +163,7 @@ LidarPipeline::ClockEvidence LidarPipeline::compare_turns(const Estimate& prior,
     mount_error_.restart();
     return {};
   }
-  mount_error_.add(prior.t, posterior.x.R, trajectory);
+  if (config_.mount_error) mount_error_.add(prior.t, posterior.x.R, trajectory);
   const Eigen::Vector3d rate = (first->R.inverse() * last->R).Log() / to_seconds(end - begin);
   time_offset_.add((prior.x.R.inverse() * posterior.x.R).Log(), rate);
   const ClockEvidence out = {time_offset_.is_doubtful(), time_offset_.offset(least)};

@@ -88,7 +88,9 @@ class Walk {
   }
 
   Samples estimated_by(std::array<bool, sensor_count> used) const {
-    Estimator estimator(settings_.robot, settings_.estimator, used);
+    EstimatorConfig config = settings_.estimator;
+    config.lidar.mount_error = false;
+    Estimator estimator(settings_.robot, config, used);
     return samples_of(estimator);
   }
 
