@@ -13,15 +13,7 @@ namespace {
 class Photometric : public testing::Test {
  protected:
   Photometric() : camera_(tiny::Scene::mount()), T_CI_(tiny::Scene::mount().T_imu_camera.inverse()), surfaces_(MapConfig{}), map_({}) {
-    std::vector<PointGroup> groups;
-    for (const Eigen::Vector4f& p : scene_.points()) {
-      PointGroup g;
-      g.mean = p.head<3>().cast<double>();
-      g.count = 20;
-      g.noise = 1e-6 * Eigen::Matrix3d::Identity();
-      groups.push_back(g);
-    }
-    surfaces_.insert(groups, 0);
+    surfaces_.insert(scene_.groups(), 0);
     remember();
   }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kilvo/filter/state.hpp"
+#include "kilvo/map/plane.hpp"
 #include "kilvo/vision/camera.hpp"
 #include "kilvo/vision/pyramid.hpp"
 
@@ -58,6 +59,18 @@ struct Scene {
     std::vector<Eigen::Vector4f> out;
     for (double y = -1.6; y < 1.6; y += 0.04) {
       for (double z = -1.3; z < 1.3; z += 0.04) out.emplace_back(wall, y, z, 10);
+    }
+    return out;
+  }
+
+  /// The same as groups of many points each, for a map.
+  std::vector<PointGroup> groups() const {
+    std::vector<PointGroup> out;
+    for (const Eigen::Vector4f& p : points()) {
+      PointGroup& g = out.emplace_back();
+      g.mean = p.head<3>().cast<double>();
+      g.count = 20;
+      g.noise = 1e-6 * Eigen::Matrix3d::Identity();
     }
     return out;
   }

@@ -14,15 +14,7 @@ class BeforeTheWall {
       : camera_(tiny::Scene::mount()),
         surfaces_(MapConfig{}),
         pipeline_(tiny::Scene::mount(), VisionConfig{}, VisualMapConfig{}, UpdateConfig{}, 100) {
-    std::vector<PointGroup> groups;
-    for (const Eigen::Vector4f& p : scene_.points()) {
-      PointGroup g;
-      g.mean = p.head<3>().cast<double>();
-      g.count = 20;
-      g.noise = 1e-6 * Eigen::Matrix3d::Identity();
-      groups.push_back(g);
-    }
-    surfaces_.insert(groups, 0);
+    surfaces_.insert(scene_.groups(), 0);
     pipeline_.see(scene_.points());
   }
 
