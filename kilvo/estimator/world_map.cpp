@@ -16,6 +16,7 @@ void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservab
   if (!may_grow) return;
   if (sweep.carries) error_.registered(T_WI, sweep.by_epoch, sweep.systematic, unobservable);
   const std::uint32_t epoch = error_.epoch_now(T_WI, sweep.posterior.P.topLeftCorner<6, 6>());
+  lidar_.range_noise = sweep.range_noise;
   const std::vector<PointGroup> seen = to_world(sweep.clusters, T_WI, p_IL_, lidar_);
   surfaces_.insert(seen, epoch);
   surfaces_.see_through(T_WI * p_IL_, seen);

@@ -62,7 +62,10 @@ Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estim
     return out;
   }
   out.clusters = downsample(out.points, prior.x.pose(), config_.voxel_size, config_.reach());
+  range_noise_.add(out.clusters, mount_.T_imu_lidar.p, config_);
+  out.range_noise = range_noise_.sigma(config_.range_noise);
   LidarConfig config = config_;
+  config.range_noise = out.range_noise;
   // With hysteresis: each change of mind would hand what was drifted since to the map.
   constexpr double to_leave = 3.0;
   if (is_blind_somewhere()) config.weak_share *= to_leave;

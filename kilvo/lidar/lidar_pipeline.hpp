@@ -10,6 +10,7 @@
 #include "kilvo/filter/update_config.hpp"
 #include "kilvo/lidar/mount_error.hpp"
 #include "kilvo/lidar/point_to_plane.hpp"
+#include "kilvo/lidar/range_noise.hpp"
 #include "kilvo/lidar/time_offset.hpp"
 #include "kilvo/lidar/undistort.hpp"
 #include "kilvo/map/voxel_map.hpp"
@@ -31,6 +32,7 @@ struct Registration {
   RegistrationReport report;
   std::vector<PointXYZI> points;  // undistorted to the prior's time, in the IMU frame
   std::vector<PointCluster> clusters;
+  double range_noise = 0;                              // m, of one range, as the sweeps so far show it
   std::vector<EpochInformation> by_epoch;              // see LidarModel
   PoseCovariance systematic = PoseCovariance::Zero();  // see LidarModel
 };
@@ -94,6 +96,7 @@ class LidarPipeline {
   Time begins_at_{};
   TimeOffset time_offset_;
   MountError mount_error_;
+  RangeNoise range_noise_;
   PoseCovariance unobservable_ = PoseCovariance::Zero();
   int sweeps_to_go_ = 0;               // consistent sweeps before the map grows again
   std::optional<Time> refused_since_;  // sweeps that fit nowhere
