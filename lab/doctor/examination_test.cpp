@@ -88,6 +88,19 @@ TEST(Doctor, ClocksAreNamed) {
   EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("legs_clock"));
 }
 
+Recorded late(double by) {
+  Recorded recorded = walked().recorded;
+  for (Sweep& s : recorded.sweeps) s.t += by, s.begin += by, s.end += by;
+  for (LegSample& s : recorded.legs) s.t += by;
+  return recorded;
+}
+
+TEST(Doctor, SensorsThatAreAllLateByAMessagesDelayAreNamedAndNotTheImu) {
+  EXPECT_THAT(causes(late(0.006), walked().robot), ElementsAre("lidar_clock", "legs_clock"));
+  EXPECT_THAT(causes(late(-0.006), walked().robot), ElementsAre("imu_clock"));
+  EXPECT_THAT(causes(late(0.03), walked().robot), ElementsAre("imu_clock"));
+}
+
 TEST(Doctor, TheImuIsNamedWhenAllOthersDisagreeWithIt) {
   const Eigen::Matrix3d quarter = turned({0, 0, 90}).matrix();
   Recorded recorded = walked().recorded;

@@ -250,6 +250,9 @@ void Examination::blame_imu_for_all() {
   const Finding& other = leg_clock != all.end() ? *leg_clock : *camera_clock;
   constexpr double same_time = 0.009;  // s
   if (std::abs(lidar_clock->size - other.size) > same_time) return;
+  // Stamps are late by what it takes to make and send a message: sensors that are all late by as little are so each by itself.
+  constexpr double usual_delay = 0.008;  // s
+  if (lidar_clock->size < 0 && lidar_clock->size > -usual_delay) return;
   // A camera that is off by another time says that it is not the IMU that all are off against.
   constexpr double other_time = 0.003;  // s
   for (const Refinement& r : refinements_) {
