@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fmt/ranges.h>
+#include <optional>
 #include <string_view>
 
 #include "apps/cli/recording_options.hpp"
@@ -38,15 +39,15 @@ struct Measured {
   std::vector<lab::Refinement> refinements;
 };
 
-// The recording until some time after `first`, held against these settings.
-Measured measured(const WrongDescription& first, const RunOptions& options, const lab::Settings& settings, std::vector<Sensor> used) {
-  std::erase(used, Sensor::camera);
+// So many seconds of the recording after `from`, or after its beginning, and all before, held against these settings.
+Measured measured(std::optional<Time> from, double seconds, const RunOptions& options, const lab::Settings& settings,
+                  const std::vector<Sensor>& used) {
   const lab::RecordingOptions wanted = recording_options(options, settings, used);
   lab::RecordingSource source({options.inputs.begin(), options.inputs.end()}, wanted);
   lab::FailingSource failing(source, options.failures, source.begin(), [&source] { return source.recorded(); });
   lab::Recorder recorder(wanted.leg_clock.has_value());
   while (const auto measurement = failing.next()) {
-    if (to_seconds(stamp_of(*measurement) - first.t) > measured_for) break;
+    if (to_seconds(stamp_of(*measurement) - from.value_or(source.begin())) > seconds) break;
     recorder.push(*measurement);
   }
   const lab::Recorded recorded = recorder.finish();
@@ -55,7 +56,38 @@ Measured measured(const WrongDescription& first, const RunOptions& options, cons
   return {std::move(diagnosis), examination.refinements()};
 }
 
+Measured measured_after(const WrongDescription& first, const RunOptions& options, const lab::Settings& settings, std::vector<Sensor> used) {
+  std::erase(used, Sensor::camera);
+  return measured(first.t, measured_for, options, settings, used);
+}
+
+void put_significant(std::vector<lab::Change>& changes, const std::vector<lab::Refinement>& refinements) {
+  for (const lab::Refinement& r : refinements) {
+    if (r.significant) lab::put(changes, r.changes);
+  }
+}
+
 }  // namespace
+
+KnownDescription refined(const RunOptions& options, const std::filesystem::path& config, const std::vector<Sensor>& used) {
+  constexpr double refined_by = 60;  // s
+  constexpr int most_rounds = 3;
+  KnownDescription known;
+  for (int round = 0; round < most_rounds; ++round) {
+    const Measured now = measured(std::nullopt, refined_by, options, mended(known, options, config), used);
+    if (now.diagnosis.good()) {
+      put_significant(known.refined, now.refinements);
+      return known;
+    }
+    for (const lab::Finding& f : now.diagnosis.findings) {
+      const WrongDescription wrong = lab::as_wrong(f, Time{}, 0);
+      // That is for the run to find, and to end with.
+      if (wrong.spoils || !wrong.is_mendable) return {};
+      lab::put(known.refined, f.changes);
+    }
+  }
+  return {};
+}
 
 KnownDescription next_round(KnownDescription known, const std::vector<WrongDescription>& found, const RunOptions& options,
                             const std::filesystem::path& config, const std::vector<Sensor>& used) {
@@ -63,7 +95,7 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
   if (known.round == 1) {
     const WrongDescription first = wrong.front();
     // The same on more data, which measure what is wrong more precisely; and what is still off once that is mended.
-    const lab::Diagnosis longer = measured(first, options, mended(known, options, config), used).diagnosis;
+    const lab::Diagnosis longer = measured_after(first, options, mended(known, options, config), used).diagnosis;
     std::vector<WrongDescription> again;
     for (const lab::Finding& f : longer.findings) again.push_back(lab::as_wrong(f, first.t, first.after));
     if (std::ranges::any_of(again, [&](const WrongDescription& w) { return known.stops(w); })) wrong = again;
@@ -72,9 +104,7 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
       if (known.stops(w)) lab::put(known.mended, w.finding.changes);
     }
     if (!known.mended.empty()) {
-      for (const lab::Refinement& r : measured(first, options, mended(known, options, config), used).refinements) {
-        if (r.significant) lab::put(known.mended, r.changes);
-      }
+      put_significant(known.mended, measured_after(first, options, mended(known, options, config), used).refinements);
     }
   } else {
     // What is still wrong was not mended by that.
@@ -87,7 +117,9 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
 
 lab::Settings mended(const KnownDescription& known, const RunOptions& options, const std::filesystem::path& config) {
   std::vector<std::string> overrides = options.overrides;
-  for (const lab::Change& change : known.mended) overrides.push_back(change.key + "=" + change.value);
+  for (const auto& changes : {known.refined, known.mended}) {
+    for (const lab::Change& change : changes) overrides.push_back(change.key + "=" + change.value);
+  }
   return lab::load_settings(config, overrides);
 }
 

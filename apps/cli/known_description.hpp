@@ -13,13 +13,18 @@ namespace kilvo::cli {
 /// Of the rounds of a run before this one.
 struct KnownDescription {
   std::vector<lab::WrongDescription> wrong;
-  std::vector<lab::Change> mended;  // settings that this round has instead of those of the user
+  std::vector<lab::Change> refined;  // settings that calibration.online has changed before the run
+  std::vector<lab::Change> mended;   // settings that this round has instead of those
   int round = 1;
   /// The data may still stop the run: as described, and as mended.
   bool is_judged() const { return round == 1 || (round == 2 && !mended.empty()); }
   /// A run with such a description is not to go on.
   bool stops(const lab::WrongDescription& found) const { return found.spoils || (round == 1 && found.is_mendable); }
 };
+
+/// What the first minute of the recording says more exactly than the description does, as by `kilvo calibrate`. Nothing when the
+/// description is wrong.
+KnownDescription refined(const RunOptions& options, const std::filesystem::path& config, const std::vector<Sensor>& used);
 
 /// The next round, after one that `found` stopped. `used`: in the first one.
 KnownDescription next_round(KnownDescription known, const std::vector<lab::WrongDescription>& found, const RunOptions& options,

@@ -110,6 +110,7 @@ class Run {
 
   // A run with a wrong description has failed, however good it looks.
   void settle_description() {
+    for (const lab::Change& c : known_.refined) facts_.warnings.push_back(fmt::format("calibration.online: {}: {}", c.key, c.value));
     for (const lab::Change& c : known_.mended) facts_.warnings.push_back(fmt::format("begun anew with {}: {}", c.key, c.value));
     wrong_.insert(wrong_.begin(), known_.wrong.begin(), known_.wrong.end());
     for (const lab::WrongDescription& wrong : wrong_) {
@@ -279,9 +280,14 @@ int run_recording(const RunOptions& options) {
   facts.warnings = choice.warnings;
   InterruptWatch interrupt;  // before any thread, so that none of them takes the signal
   // No trajectory leaves that a wrong description has spoilt: a round that it stops is followed by another one.
-  for (KnownDescription known;;) {
+  KnownDescription known;
+  if (settings.calibration.online) {
+    if (!options.quiet) fmt::print(stderr, "kilvo: calibrating by the first minute\n");
+    known = refined(options, config, choice.used);
+  }
+  for (;;) {
+    settings = mended(known, options, config);
     if (known.round > 1) {
-      settings = mended(known, options, config);
       facts.sensors = sound(choice.used, known);
       remove_results(options.out);
       if (!options.quiet) fmt::print(stderr, "kilvo: the run begins anew{}\n", consequence(known, choice.used, facts.sensors));

@@ -111,6 +111,7 @@ std::vector<Setting> list_settings(Settings& s) {
   list.fields("estimator", s.estimator);
   list.fields("estimator.initial", s.estimator.initial);
   list.fields("estimator.update", s.estimator.update);
+  list.fields("calibration", s.calibration);
   list.fields("live", s.live);
   forget_defaults_of_intrinsics(out);
   mark_common(out);

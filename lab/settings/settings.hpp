@@ -13,6 +13,7 @@
 #include "kilvo/sensors/measurement.hpp"
 #include "kilvo/sensors/robot.hpp"
 #include "lab/mapping/map_builder.hpp"
+#include "lab/settings/calibration_config.hpp"
 #include "lab/settings/live_config.hpp"
 
 namespace kilvo::lab {
@@ -29,6 +30,7 @@ struct Settings {
   LegClockConfig leg_clock;
   EstimatorConfig estimator;
   MappingConfig mapping;
+  CalibrationConfig calibration;
   LiveConfig live;
 
   std::map<std::string, std::string> given;  // key -> where it was set ("g1.yaml:12"); all others have their defaults

@@ -83,7 +83,7 @@ TEST(ShowSettings, TheJsonIsNested) {
   const std::string text = settings_json(parse_settings("imu: {topic: /imu}\nestimator: {update: {max_iterations: 4}}", "x", "."));
   EXPECT_THAT(text, HasSubstr("\"update\": {\"max_iterations\": 4, "));
   EXPECT_THAT(text, testing::StartsWith("{\"imu\": {\"topic\": \"/imu\", "));
-  EXPECT_THAT(text, HasSubstr("}}, \"live\": {"));
+  EXPECT_THAT(text, HasSubstr("}}, \"calibration\": {\"online\": false}, \"live\": {"));
   EXPECT_THAT(text, testing::EndsWith("}}"));
 }
 

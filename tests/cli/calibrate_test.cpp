@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <fmt/core.h>
+#include <nlohmann/json.hpp>
 
 #include "lab/settings/settings.hpp"
 #include "tests/cli/story.hpp"
@@ -60,6 +61,25 @@ TEST_F(Calibrate, MendsWhatIsMuchOffFirst) {
   EXPECT_LT(left(), 0.15);
   EXPECT_NEAR(lidar(better_).time_offset, 0, 0.001);
   EXPECT_THAT(read_text(report_ + "/calibration.html"), HasSubstr("Mended first"));
+}
+
+TEST_F(Calibrate, IsDoneByARunItself) {
+  // m, of the sweeps
+  const auto error_of = [this](const std::vector<std::string>& settings, const std::string& warning) {
+    const std::string out = folder_ / "out";
+    std::vector<std::string> words{"run", walk_, "--sensors", "imu,lidar", "--out", out, "--quiet", "--no-map"};
+    for (const std::string& setting : settings) words.insert(words.end(), {"--set", setting});
+    const Finished run = kilvo(words);
+    EXPECT_EQ(run.code, 0);
+    EXPECT_THAT(run.err, HasSubstr(warning));
+    return nlohmann::json::parse(kilvo({"eval", out + "/sweeps.tum", walk_ + "/gt.tum", "--json"}).out).at("ate_rmse_m").get<double>();
+  };
+  const double right = error_of({}, "");
+  const std::vector<std::string> wrong{wrong_by(0.5), "lidar.time_offset=0.003"};
+  std::vector<std::string> online = wrong;
+  online.emplace_back("calibration.online=true");
+  EXPECT_LT(error_of(online, "warning: calibration.online: lidar.time_offset: "), 1.2 * right);
+  EXPECT_GT(error_of(wrong, ""), 1.5 * right);
 }
 
 TEST_F(Calibrate, ChangesNothingThatIsRight) {
