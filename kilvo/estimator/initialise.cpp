@@ -75,14 +75,20 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   const auto gyro = statistics_of(window_, &ImuSample::gyro);
   const auto accel = statistics_of(window_, &ImuSample::accel);
   const double unit = unit_of(accel.mean.norm());
-  constexpr double largest_gyro_bias = 0.03;  // rad/s; a larger mean is motion
+  constexpr double usual_gyro_bias = 0.03, largest_gyro_bias = 0.1;  // rad/s; a larger mean is motion
   // A slow sway has a small deviation and is no rest: its rate would be taken for the bias. It shows as a change within the window.
   constexpr double largest_change = 0.004;  // rad/s
   const auto middle = window_.begin() + static_cast<std::ptrdiff_t>(window_.size() / 2);
   const std::deque<ImuSample> older(window_.begin(), middle), newer(middle, window_.end());
   const Eigen::Vector3d change = statistics_of(newer, &ImuSample::gyro).mean - statistics_of(older, &ImuSample::gyro).mean;
-  const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && gyro.mean.norm() < largest_gyro_bias &&
-                     change.cwiseAbs().maxCoeff() < largest_change && accel.sigma.maxCoeff() * unit < config_.still_accel;
+  // A mean that is more than most biases is one if gravity does not turn by it.
+  const Eigen::Vector3d by_motion = -0.5 * config_.still_time * gyro.mean.cross(accel.mean);
+  const Eigen::Vector3d turned = statistics_of(newer, &ImuSample::accel).mean - statistics_of(older, &ImuSample::accel).mean;
+  const double noise = accel.sigma.norm() * std::sqrt(4.0 / static_cast<double>(window_.size()));
+  const bool is_level = by_motion.norm() < 3 * noise || turned.dot(by_motion) < 0.5 * by_motion.squaredNorm();
+  const bool is_bias = gyro.mean.norm() < usual_gyro_bias || (gyro.mean.norm() < largest_gyro_bias && is_level);
+  const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && is_bias && change.cwiseAbs().maxCoeff() < largest_change &&
+                     accel.sigma.maxCoeff() * unit < config_.still_accel;
   if (still) return start(true);
   if (s.t - *first_ >= from_seconds(config_.moving_start)) return start(false);
   return std::nullopt;

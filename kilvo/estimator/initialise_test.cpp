@@ -56,6 +56,30 @@ TEST(Initialiser, StartsAtTheFirstSampleOfHalfASecondAtRest) {
   EXPECT_EQ(start->accel_scale, 1.0);
 }
 
+// 2 degrees a second is not unusual for a gyro, and what its axes take for turning while gravity pulls comes on top.
+TEST(Initialiser, StandsStillWithAGyroWhoseBiasIsLarge) {
+  const Eigen::Vector3d bias(0.03, -0.04, 0.02);
+  const auto start = start_from(bias, {0, 0, 9.8});
+  ASSERT_TRUE(start);
+  EXPECT_TRUE(start->still);
+  EXPECT_LT((start->estimate.x.bg - bias).norm(), 1e-12);
+}
+
+TEST(Initialiser, DoesNotTakeAnEvenTurnForABias) {
+  const Eigen::Vector3d rate(0.05, 0.02, 0);
+  Initialiser initialiser(InitialConfig{}, true, ProcessNoise{}.accel);
+  std::optional<Start> start;
+  for (int i = 0; i < 1000 && !start; ++i) {
+    ImuSample s;
+    s.t = time_from_ns(0) + Duration(5'000'000LL * i);
+    s.gyro = rate;
+    s.accel = SO3::Exp(0.005 * i * rate).inverse() * Eigen::Vector3d(0, 0, 9.8);
+    start = initialiser.add(s);
+  }
+  ASSERT_TRUE(start);
+  EXPECT_FALSE(start->still);
+}
+
 TEST(Initialiser, DetectsAnAccelerometerInG) {
   const auto start = start_from(Eigen::Vector3d::Zero(), {0, 0, -1.01});
   ASSERT_TRUE(start);

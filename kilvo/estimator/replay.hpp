@@ -71,6 +71,10 @@ class Replay {
   /// What the accelerometer reported after the time of `base` is not believed: as if nothing had pushed the robot, nor was known to.
   void doubt_acceleration(const Estimate& base);
 
+  /// Of what the accelerometer reported after the time of `base` the hardest knock is not believed to be all of it: ranges end before the
+  /// filter of the IMU, where no sample shows it. False when there was none.
+  bool doubt_knock(const Estimate& base);
+
   /// What is not needed by estimates of `t` and later; nothing that was remembered, for `t` has another estimate now.
   void forget_before(Time t);
   /// Becomes what `other` still knows that estimates of `t` and later need. Allocates only when it has never held so much.

@@ -49,7 +49,7 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
   const PoseCovariance map_error = map_.error_at(prior.x.pose());
   const bool first = map_.surfaces().empty();
   Registration sweep = lidar_.measure(scan, end, prior, history_.trajectory(), map_.surfaces(), map_error, statistics.points);
-  if (sweep.refused == Reason::fits_nowhere) doubt_acceleration(scan, end, prior, sweep);
+  if (sweep.refused == Reason::fits_nowhere || lidar_.is_surprised(prior, sweep, map_error)) doubt_acceleration(scan, end, prior, sweep);
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
   if (sweep.refused) return refuse_sweep(*sweep.refused, prior, end);
@@ -89,18 +89,23 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
   if (!status_.has_legs()) emit(history_.now(), out);
 }
 
-// The prior is uncertain for what the accelerometer reported: where that alone is wrong, the sweep fits where nothing has pushed the robot.
+// The sweep is not where it should be for what the accelerometer reported. Where the prior is uncertain for that alone, it fits where
+// nothing has pushed the robot; where it fits, a knock was harder than was reported.
 void Estimator::doubt_acceleration(const LidarScan& scan, Time end, Estimate& prior, Registration& sweep) {
   constexpr Duration longest = std::chrono::milliseconds(300);
-  if (!sweep.searched || end - history_.base().t > longest) return;
+  if ((sweep.refused && !sweep.searched) || end - history_.base().t > longest) return;
   History doubted = history_;
-  doubted.doubt_acceleration();
+  if (sweep.refused) {
+    doubted.doubt_acceleration();
+  } else if (!doubted.doubt_knock()) {
+    return;
+  }
   const Estimate expected = doubted.at(prior.t);
   doubted.record_from(expected, end);
   PointDrops counted;
-  Registration again =
-      lidar_.measure(scan, end, expected, doubted.trajectory(), map_.surfaces(), map_.error_at(expected.x.pose()), counted);
-  if (again.refused || !again.carries) return;
+  const PoseCovariance map_error = map_.error_at(expected.x.pose());
+  Registration again = lidar_.measure(scan, end, expected, doubted.trajectory(), map_.surfaces(), map_error, counted);
+  if (again.refused || !again.carries || (!sweep.refused && !LidarPipeline::agrees(expected, again, map_error))) return;
   history_ = std::move(doubted);
   prior = expected;
   sweep = std::move(again);

@@ -30,6 +30,14 @@ PoseCovariance noise_of_velocity(const Covariance& P) {
   return out;
 }
 
+// How far the sweep moved the pose, per covariance of the prior.
+double squared_change(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
+  PoseCovariance P = prior.P.topLeftCorner<6, 6>() + map_error;
+  P.diagonal().array() += 1e-6;
+  const Eigen::Matrix<double, 6, 1> change = boxminus(sweep.posterior.x, prior.x).head<6>();
+  return change.dot(P.ldlt().solve(change));
+}
+
 // Of sound sweeps nine tenths of what meets a surface lies on it, in a crowd as well.
 bool contradicts_map(const RegistrationReport& report) {
   constexpr double agreeing_share = 0.4;
@@ -134,15 +142,26 @@ void LidarPipeline::accept(const Registration& sweep) {
   refused_since_.reset();
 }
 
+bool LidarPipeline::is_surprised(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
+  if (sweep.refused || !sweep.carries || sweep.searched || is_rejoining() || sweep.report.matched == 0) return false;
+  const double change = squared_change(prior, sweep, map_error);
+  constexpr double least = 30, unusual = 8, memory = 50;  // -, -, sweeps
+  const bool out = change > std::max(least, unusual * usual_change_);
+  usual_change_ += (std::min(change, least) - usual_change_) / memory;
+  return out;
+}
+
+bool LidarPipeline::agrees(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
+  constexpr double six_at_99_9 = 22.46;
+  return squared_change(prior, sweep, map_error) < six_at_99_9;
+}
+
 bool LidarPipeline::may_learn(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
   if (!is_rejoining()) return true;
-  constexpr double agreeing_share = 0.6, six_at_99_9 = 22.46;
+  constexpr double agreeing_share = 0.6;
   const int met = sweep.report.matched + sweep.report.rejected;
   if (met < known_share * sweep.report.clusters) return true;
-  PoseCovariance P = prior.P.topLeftCorner<6, 6>() + map_error;
-  P.diagonal().array() += 1e-6;
-  const Eigen::Matrix<double, 6, 1> change = boxminus(sweep.posterior.x, prior.x).head<6>();
-  const bool consistent = sweep.report.matched > agreeing_share * met && change.dot(P.ldlt().solve(change)) < six_at_99_9;
+  const bool consistent = sweep.report.matched > agreeing_share * met && agrees(prior, sweep, map_error);
   sweeps_to_go_ = consistent ? sweeps_to_go_ - 1 : consistent_sweeps;
   return !is_rejoining();
 }

@@ -57,6 +57,13 @@ class LidarPipeline {
   Registration measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory, const VoxelMap& map,
                        const PoseCovariance& map_error, PointDrops& drops);
 
+  /// The sweep was registered much farther from `prior` than the covariance says, and than sweeps usually are. `map_error`: of the map
+  /// around the prior.
+  bool is_surprised(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
+
+  /// It is where the covariance says.
+  static bool agrees(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
+
   /// The registration is used: which directions it knew is remembered.
   void accept(const Registration& sweep);
   /// After an accepted registration: whether the map may grow by it. After an outage the map is joined again, not smeared: it grows when
@@ -98,6 +105,7 @@ class LidarPipeline {
   MountError mount_error_;
   RangeNoise range_noise_;
   PoseCovariance unobservable_ = PoseCovariance::Zero();
+  double usual_change_ = 0;            // mean of squared changes by sweeps, per covariance of the prior
   int sweeps_to_go_ = 0;               // consistent sweeps before the map grows again
   std::optional<Time> refused_since_;  // sweeps that fit nowhere
 };
