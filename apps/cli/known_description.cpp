@@ -1,6 +1,7 @@
 #include "apps/cli/known_description.hpp"
 
 #include <algorithm>
+#include <fmt/core.h>
 #include <fmt/ranges.h>
 #include <optional>
 #include <string_view>
@@ -69,7 +70,10 @@ void put_significant(std::vector<lab::Change>& changes, const std::vector<lab::R
 
 }  // namespace
 
-KnownDescription refined(const RunOptions& options, const std::filesystem::path& config, const std::vector<Sensor>& used) {
+KnownDescription refined(const lab::Settings& settings, const RunOptions& options, const std::filesystem::path& config,
+                         const std::vector<Sensor>& used) {
+  if (!settings.calibration.online) return {};
+  if (!options.quiet) fmt::print(stderr, "kilvo: calibrating by the first minute\n");
   constexpr double refined_by = 60;  // s
   constexpr int most_rounds = 3;
   KnownDescription known;

@@ -22,9 +22,10 @@ struct KnownDescription {
   bool stops(const lab::WrongDescription& found) const { return found.spoils || (round == 1 && found.is_mendable); }
 };
 
-/// What the first minute of the recording says more exactly than the description does, as by `kilvo calibrate`. Nothing when the
-/// description is wrong.
-KnownDescription refined(const RunOptions& options, const std::filesystem::path& config, const std::vector<Sensor>& used);
+/// Before the first round, where calibration.online asks for it: what the first minute of the recording says more exactly than the
+/// description does, as by `kilvo calibrate`. Nothing when the description is wrong.
+KnownDescription refined(const lab::Settings& settings, const RunOptions& options, const std::filesystem::path& config,
+                         const std::vector<Sensor>& used);
 
 /// The next round, after one that `found` stopped. `used`: in the first one.
 KnownDescription next_round(KnownDescription known, const std::vector<lab::WrongDescription>& found, const RunOptions& options,

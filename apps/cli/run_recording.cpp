@@ -280,12 +280,7 @@ int run_recording(const RunOptions& options) {
   facts.warnings = choice.warnings;
   InterruptWatch interrupt;  // before any thread, so that none of them takes the signal
   // No trajectory leaves that a wrong description has spoilt: a round that it stops is followed by another one.
-  KnownDescription known;
-  if (settings.calibration.online) {
-    if (!options.quiet) fmt::print(stderr, "kilvo: calibrating by the first minute\n");
-    known = refined(options, config, choice.used);
-  }
-  for (;;) {
+  for (KnownDescription known = refined(settings, options, config, choice.used);;) {
     settings = mended(known, options, config);
     if (known.round > 1) {
       facts.sensors = sound(choice.used, known);

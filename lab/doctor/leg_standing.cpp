@@ -60,7 +60,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   const Standing described = stands(nullptr);
   double most = std::max(longer_than, clearly * described.worth() + least_standing), longer = clearly * described.both();
   // Soles that stand that long leave no room for others that would stand clearly longer, but for those on links above the ankles.
-  constexpr double well = 0.45;  // of the time in which the robot moves
+  constexpr double well = 0.45, as_feet_do = 0.28;  // of the time in which the robot moves
   std::vector<LegHypothesis> all;
   if (described.worth() < well * described.moving) all = leg_hypotheses(recorded_legs_, robot_);
   if (described.worth() < least_standing) {
@@ -68,14 +68,15 @@ bool Examination::try_standing_hypotheses(double longer_than) {
     for (LegHypothesis& h : size_hypotheses()) all.push_back(std::move(h));
   }
   const std::size_t joints = all.size();
-  // A link above an ankle that hardly turns stands nearly as well: only a link that stands far better.
+  // A link above an ankle that hardly turns stands nearly as well, and on soft ground, in which no sole stands, better: only a link that
+  // stands far better, and as feet do.
   for (LegHypothesis& h : foot_link_hypotheses(robot_)) all.push_back(std::move(h));
   const LegHypothesis* best = nullptr;
   Standing then;
   for (const LegHypothesis& h : all) {
     if (static_cast<std::size_t>(&h - all.data()) == joints) {
       if (best != nullptr) break;
-      longer = 2 * described.both() + least_standing;
+      longer = std::max(2 * described.both() + least_standing, as_feet_do * described.moving);
     }
     // The turning tells the link of the IMU better, if it tells anything.
     if (h.culprit != Sensor::legs && (legs_.known || turns_with_link(h))) continue;
