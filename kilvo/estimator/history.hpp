@@ -36,8 +36,11 @@ class History {
   Estimate at(Time t);
   /// What the accelerometer reported since the base is wrong. now() and closed() stay what they were.
   void doubt_acceleration() { replay_.doubt_acceleration(base_); }
-  /// The hardest knock since the base was harder than that: see Replay::doubt_knock.
-  bool doubt_knock() { return replay_.doubt_knock(base_); }
+  /// The velocity of the base is less certain than its covariance says, by this standard deviation, m/s. now() and closed() stay as well.
+  void doubt_velocity(double sigma) {
+    base_.P.diagonal().segment<3>(at::v).array() += sigma * sigma;
+    replay_.forget_estimates();
+  }
   /// Puts the poses from `e` to `until` into the trajectory.
   void record_from(const Estimate& e, Time until);
   /// How the IMU moved from `t` to the base: its poses at both, as the trajectory has them; the same when `t` is not before the base. None

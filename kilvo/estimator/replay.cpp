@@ -263,19 +263,6 @@ void Replay::doubt_acceleration(const Estimate& base) {
   }
 }
 
-bool Replay::doubt_knock(const Estimate& base) {
-  constexpr double least = 10, part = 0.5;  // m/s^2 beyond gravity; of the largest
-  const Eigen::Vector3d rest = base.x.ba - base.x.R.inverse() * base.x.g;
-  const auto pushed = [&](const ImuSample& s) { return s.t > base.t ? (s.accel - rest).norm() : 0; };
-  double largest = 0;
-  for (const ImuSample& s : imu_) largest = std::max(largest, pushed(s));
-  if (largest < least) return false;
-  remembered_.clear();
-  taken_.clear();
-  for (ImuSample& s : imu_) s.accel_clipped = s.accel_clipped || pushed(s) > part * largest;
-  return true;
-}
-
 void Replay::forget_before(Time t) {
   remembered_.clear();
   taken_.clear();

@@ -71,9 +71,11 @@ class Replay {
   /// What the accelerometer reported after the time of `base` is not believed: as if nothing had pushed the robot, nor was known to.
   void doubt_acceleration(const Estimate& base);
 
-  /// Of what the accelerometer reported after the time of `base` the hardest knock is not believed to be all of it: ranges end before the
-  /// filter of the IMU, where no sample shows it. False when there was none.
-  bool doubt_knock(const Estimate& base);
+  /// The oldest estimate that will be replayed has changed.
+  void forget_estimates() {
+    remembered_.clear();
+    taken_.clear();
+  }
 
   /// What is not needed by estimates of `t` and later; nothing that was remembered, for `t` has another estimate now.
   void forget_before(Time t);

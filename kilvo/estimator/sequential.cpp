@@ -90,15 +90,16 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
 }
 
 // The sweep is not where it should be for what the accelerometer reported. Where the prior is uncertain for that alone, it fits where
-// nothing has pushed the robot; where it fits, a knock was harder than was reported.
+// nothing has pushed the robot; where it fits, a push was not what was reported, and the velocity that it gave is not known.
 void Estimator::doubt_acceleration(const LidarScan& scan, Time end, Estimate& prior, Registration& sweep) {
   constexpr Duration longest = std::chrono::milliseconds(300);
-  if ((sweep.refused && !sweep.searched) || end - history_.base().t > longest) return;
+  const double since = to_seconds(prior.t - history_.base().t);
+  if ((sweep.refused && !sweep.searched) || end - history_.base().t > longest || since <= 0) return;
   History doubted = history_;
   if (sweep.refused) {
     doubted.doubt_acceleration();
-  } else if (!doubted.doubt_knock()) {
-    return;
+  } else {
+    doubted.doubt_velocity((sweep.posterior.x.p - prior.x.p).norm() / since);
   }
   const Estimate expected = doubted.at(prior.t);
   doubted.record_from(expected, end);

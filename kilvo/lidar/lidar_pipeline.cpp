@@ -18,6 +18,9 @@ constexpr double known_share = 0.2;
 // Fewer rows, or more directions than these that they do not hold: not worth the name of a registration.
 constexpr int fewest_rows = 30, most_weak = 3;
 
+// Of chi-square with six degrees of freedom.
+constexpr double six_at_99_9 = 22.46;
+
 bool says_enough(const RegistrationReport& report) { return report.matched >= fewest_rows && report.degeneracy.weak_count <= most_weak; }
 
 // A scan that was undistorted with a velocity that is not known: its ends are out of place, at the worst all on one side.
@@ -145,14 +148,13 @@ void LidarPipeline::accept(const Registration& sweep) {
 bool LidarPipeline::is_surprised(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
   if (sweep.refused || !sweep.carries || sweep.searched || is_rejoining() || sweep.report.matched == 0) return false;
   const double change = squared_change(prior, sweep, map_error);
-  constexpr double least = 30, unusual = 8, memory = 50;  // -, -, sweeps
-  const bool out = change > std::max(least, unusual * usual_change_);
-  usual_change_ += (std::min(change, least) - usual_change_) / memory;
+  constexpr double unusual = 8, memory = 50;  // -, sweeps
+  const bool out = change > std::max(six_at_99_9, unusual * usual_change_);
+  usual_change_ += (std::min(change, six_at_99_9) - usual_change_) / memory;
   return out;
 }
 
 bool LidarPipeline::agrees(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
-  constexpr double six_at_99_9 = 22.46;
   return squared_change(prior, sweep, map_error) < six_at_99_9;
 }
 

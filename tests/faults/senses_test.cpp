@@ -272,6 +272,26 @@ TEST_F(Senses, OneClippedSampleIsSeenAndCostsLittle) {
   }
 }
 
+// Ranges end before the filter of the IMU: two samples of 20 and 14 m/s^2 stand for a knock of 45, and no value is at the end of a range.
+TEST_F(Senses, AKnockThatNoSampleShowsWholeIsNotTakenForABias) {
+  const auto hidden = [n = 0](Measurement& m, double) mutable {
+    auto* imu = std::get_if<ImuSample>(&m);
+    if (imu == nullptr) return true;
+    ++n;
+    if (n == 1600 || n == 1601) imu->accel.y() += n == 1600 ? 20 : 14;  // with the sign of what is missing
+    return true;
+  };
+  const std::optional<std::array<bool, sensor_count>> used(li);
+  const Outcome whole = walk_->with({}, {used, {}, {}, {}}), o = walk_->with({}, {used, hidden, {}, {}});
+  const double as_usual = whole.worst(&Moment::error, 0, 14);
+  std::printf("a knock that is shown in part: worst %.2f mm after 0.3 s, %.2f mm without; %.1f sigmas, bias %.3f m/s^2\n",
+              1e3 * o.worst(&Moment::error, 8.3, 14), 1e3 * as_usual, o.worst(&Moment::sigmas, 8.3, 14),
+              o.worst(&Moment::accel_bias, 5, 14));
+  EXPECT_LT(o.worst(&Moment::error, 8.3, 14), as_usual + 0.001);
+  EXPECT_LT(o.worst(&Moment::sigmas, 8.3, 14), 4.0);
+  EXPECT_LT(o.worst(&Moment::accel_bias, 5, 14), 0.2);
+}
+
 // It is told with its reason, sensor by sensor, what came before an IMU that never came; and no more of it waits than a few seconds.
 TEST_F(Senses, WithoutAnyImuMessageAllElseIsDroppedAndTold) {
   Estimator estimator(walk_->settings().robot, walk_->settings().estimator, walk_->used());
