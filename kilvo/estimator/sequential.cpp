@@ -49,7 +49,8 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
   const PoseCovariance map_error = map_.error_at(prior.x.pose());
   const bool first = map_.surfaces().empty();
   Registration sweep = lidar_.measure(scan, end, prior, history_.trajectory(), map_.surfaces(), map_error, statistics.points);
-  if (sweep.refused == Reason::fits_nowhere || lidar_.is_surprised(prior, sweep, map_error)) doubt_acceleration(scan, end, prior, sweep);
+  const bool is_surprised = lidar_.is_surprised(prior, sweep, map_error);
+  if (sweep.refused == Reason::fits_nowhere || is_surprised) doubt_acceleration(scan, end, prior, sweep);
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
   if (sweep.refused) return refuse_sweep(*sweep.refused, prior, end);
@@ -99,7 +100,10 @@ void Estimator::doubt_acceleration(const LidarScan& scan, Time end, Estimate& pr
   if (sweep.refused) {
     doubted.doubt_acceleration();
   } else {
-    doubted.doubt_velocity((sweep.posterior.x.p - prior.x.p).norm() / since);
+    constexpr double most = 0.5;  // m/s, with which a sweep still has its shape
+    const double off = (sweep.posterior.x.p - prior.x.p).norm() / since;
+    if (off > most) return;
+    doubted.doubt_velocity(off);
   }
   const Estimate expected = doubted.at(prior.t);
   doubted.record_from(expected, end);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <utility>
 
 #include "kilvo/filter/update.hpp"
 #include "kilvo/lidar/relocate.hpp"
@@ -146,12 +147,16 @@ void LidarPipeline::accept(const Registration& sweep) {
 }
 
 bool LidarPipeline::is_surprised(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
+  const int expected = std::exchange(expected_sweeps_, 0);
   if (sweep.refused || !sweep.carries || sweep.searched || is_rejoining() || sweep.report.matched == 0) return false;
   const double change = squared_change(prior, sweep, map_error);
   constexpr double unusual = 8, memory = 50;  // -, sweeps
   const bool out = change > std::max(six_at_99_9, unusual * usual_change_);
   usual_change_ += (std::min(change, six_at_99_9) - usual_change_) / memory;
-  return out;
+  if (!out) expected_sweeps_ = expected + 1;
+  // What goes on is no push.
+  constexpr int before = 5;  // sweeps
+  return out && expected >= before;
 }
 
 bool LidarPipeline::agrees(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {

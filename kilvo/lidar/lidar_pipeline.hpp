@@ -57,8 +57,8 @@ class LidarPipeline {
   Registration measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory, const VoxelMap& map,
                        const PoseCovariance& map_error, PointDrops& drops);
 
-  /// The sweep was registered much farther from `prior` than the covariance says, and than sweeps usually are. `map_error`: of the map
-  /// around the prior.
+  /// The sweep was registered much farther from `prior` than the covariance says and than sweeps usually are, and those before it were not.
+  /// `map_error`: of the map around the prior.
   bool is_surprised(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
 
   /// It is where the covariance says.
@@ -106,6 +106,7 @@ class LidarPipeline {
   RangeNoise range_noise_;
   PoseCovariance unobservable_ = PoseCovariance::Zero();
   double usual_change_ = 0;            // mean of squared changes by sweeps, per covariance of the prior
+  int expected_sweeps_ = 0;            // in a row, that were where they usually are
   int sweeps_to_go_ = 0;               // consistent sweeps before the map grows again
   std::optional<Time> refused_since_;  // sweeps that fit nowhere
 };

@@ -148,10 +148,10 @@ TEST_P(Leavers, LeaveNoPlaneTwoSecondsLaterAndTheWallsStay) {
   EXPECT_GT(walls.there, 0.89 * walls.all);
 }
 
-// A box of 20 000 points keeps a strip at its side, which beams graze.
+// A box of 20 000 points keeps a strip at its side, which beams graze, and a person those parts that a robot that walks sees it cover.
 INSTANTIATE_TEST_SUITE_P(All, Leavers,
                          testing::Values(Case{"stand", 4000, person, 0}, Case{"stand", 20000, person, 0}, Case{"stand", 20000, box, 0.05},
-                                         Case{"stand", 4000, box, 0}, Case{"room", 4000, person, 0.05}, Case{"room", 20000, person, 0.05},
+                                         Case{"stand", 4000, box, 0}, Case{"room", 4000, person, 0.05}, Case{"room", 20000, person, 0.08},
                                          Case{"room", 20000, box, 0.05}));
 
 }  // namespace
