@@ -281,7 +281,7 @@ int run_recording(const RunOptions& options) {
   InterruptWatch interrupt;  // before any thread, so that none of them takes the signal
   // No trajectory leaves that a wrong description has spoilt: a round that it stops is followed by another one.
   for (KnownDescription known = refined(settings, options, config, choice.used);;) {
-    settings = mended(known, options, config);
+    if (known.round > 1 || !known.refined.empty()) settings = mended(known, options, config);
     if (known.round > 1) {
       facts.sensors = sound(choice.used, known);
       remove_results(options.out);

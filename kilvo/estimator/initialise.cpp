@@ -85,8 +85,8 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   const Eigen::Vector3d by_motion = -0.5 * config_.still_time * gyro.mean.cross(accel.mean);
   const Eigen::Vector3d turned = statistics_of(newer, &ImuSample::accel).mean - statistics_of(older, &ImuSample::accel).mean;
   const double noise = accel.sigma.norm() * std::sqrt(4.0 / static_cast<double>(window_.size()));
-  const bool is_level = by_motion.norm() < 3 * noise || turned.dot(by_motion) < 0.5 * by_motion.squaredNorm();
-  const bool is_bias = gyro.mean.norm() < usual_gyro_bias || (gyro.mean.norm() < largest_gyro_bias && is_level);
+  const bool gravity_stays = by_motion.norm() < 3 * noise || turned.dot(by_motion) < 0.5 * by_motion.squaredNorm();
+  const bool is_bias = gyro.mean.norm() < usual_gyro_bias || (gyro.mean.norm() < largest_gyro_bias && gravity_stays);
   const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && is_bias && change.cwiseAbs().maxCoeff() < largest_change &&
                      accel.sigma.maxCoeff() * unit < config_.still_accel;
   if (still) return start(true);
