@@ -58,7 +58,8 @@ std::set<std::string> topics_of(const lab::RecordingReader& recording) {
 
 // A topic of the sensor's kind that no setting names: then the setting is misspelt, and the sensor is not simply absent.
 std::optional<std::string> unnamed_topic(Sensor sensor, const lab::Settings& settings, const lab::RecordingReader& recording) {
-  for (const auto& [id, connection] : recording.connections()) {
+  for (const auto& entry : recording.connections()) {
+    const lab::Channel& connection = entry.second;
     if (!lab::is_type_of(sensor, connection.type)) continue;
     const bool named = std::ranges::any_of(every_sensor, [&](Sensor other) {
       return settings.has(other) && lab::topic_matches(other, settings.topic(other), connection.topic);

@@ -145,6 +145,10 @@ ImuSample Replay::imu_at(Time t) const {
 }
 
 LegModel::Used Replay::apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept) const {
+  if (step.rise) {
+    const Eigen::Vector3d wrong = *step.rise * e.x.g.normalized();
+    e.P.block<3, 3>(at::v, at::v) += wrong * wrong.transpose();
+  }
   bool any = false;
   for (std::size_t side = 0; side < 2; ++side) {
     const Stance& foot = step.foot[side];

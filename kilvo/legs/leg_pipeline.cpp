@@ -16,6 +16,7 @@ constexpr Duration longest_flight = std::chrono::milliseconds(500);
 LegPipeline::LegUpdate LegPipeline::measure(const Feet& feet, const Estimate& predicted, const ImuSample& imu, const VoxelMap* map,
                                             StanceTracker::Ground ground) {
   LegUpdate out;
+  const bool on_legs_alone = ground == StanceTracker::Ground::use;
   if (always_height_) ground = StanceTracker::Ground::use;
   leg_length_ = std::max(leg_length_, feet.foot[0].p[0].norm());
   const State& x = predicted.x;
@@ -26,6 +27,8 @@ LegPipeline::LegUpdate LegPipeline::measure(const Feet& feet, const Estimate& pr
   out.contact_us = watch.lap_us();
   out.step = stances_.step(feet, contacts_.contacts(), x, omega, sigma_v, map, ground);
   contacts_.adapt(out.step, x, imu.gyro, ground);
+  // Where the LiDAR gives the velocity, soles that rise are not the state's doing.
+  if (!on_legs_alone) out.step.rise.reset();
   return out;
 }
 

@@ -19,7 +19,7 @@ SoleNoise::SoleNoise(const LegConfig& config)
       across_(first_guess * first_guess, 0, prior_averages, memory_averages),
       upwards_(config.vertical_velocity_sigma * config.vertical_velocity_sigma, 0, prior_averages, memory_averages) {}
 
-void SoleNoise::add(std::size_t side, const Eigen::Vector3d& velocity_W, const Eigen::Vector3d& up_W, double dt) {
+void SoleNoise::add(std::size_t side, const Eigen::Vector3d& velocity_W, const Eigen::Vector3d& up_W, double dt, double sigma_v) {
   Sum& sum = sum_[side];
   sum.way += dt * velocity_W;
   sum.time += dt;
@@ -27,8 +27,24 @@ void SoleNoise::add(std::size_t side, const Eigen::Vector3d& velocity_W, const E
   const Eigen::Vector3d mean = sum.way / sum.time;
   const double up = up_W.dot(mean);
   across_.add(0.5 * (mean.squaredNorm() - up * up), 1);
-  upwards_.add(up * up, 1);
+  add_rise(up, sigma_v * sigma_v);
   sum = {};
+}
+
+void SoleNoise::add_rise(double up, double variance_v) {
+  // Of two averages, most often of different feet, beyond three standard deviations.
+  constexpr double beyond = 9;
+  const double variance = vertical() * vertical(), mean = 0.5 * (up + last_rise_);
+  if (rises_ > 0 && mean * mean > beyond * (variance_v + 0.5 * variance)) {
+    rise_ = mean;
+    rises_ = 0;
+  }
+  // What is alike at all steps is the state's error; one average alone does not make soles that are known to be still noisy.
+  rises_ = std::min(rises_ + 1, memory_averages);
+  const double off = up - (rises_ > 1 ? usual_rise_ : 0);
+  usual_rise_ = up - off * (1 - 1 / rises_);
+  last_rise_ = up;
+  if (rises_ > 1) upwards_.add((1 - 1 / rises_) * std::min(off * off, variance_v + 0.5 * variance), 1);
 }
 
 double SoleNoise::horizontal() const { return std::max(config_.velocity_sigma, common * std::sqrt(across_.mean())); }

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <optional>
+#include <utility>
 
 #include "kilvo/legs/leg_config.hpp"
 #include "kilvo/math/running_statistics.hpp"
@@ -16,22 +18,31 @@ class SoleNoise {
  public:
   explicit SoleNoise(const LegConfig& config);
 
-  /// `velocity_W`: of the point on which this foot stands, m/s; `up_W`: unit vector against gravity.
-  void add(std::size_t side, const Eigen::Vector3d& velocity_W, const Eigen::Vector3d& up_W, double dt);
+  /// `velocity_W`: of the point on which this foot stands, m/s; `up_W`: unit vector against gravity; `sigma_v`: of the state's velocity,
+  /// m/s.
+  void add(std::size_t side, const Eigen::Vector3d& velocity_W, const Eigen::Vector3d& up_W, double dt, double sigma_v = 0);
   /// The foot leaves, or stands on another place.
   void interrupt(std::size_t side) { sum_[side] = {}; }
 
   double horizontal() const;  // standard deviation of each axis, m/s
   double vertical() const;    // m/s
 
+  /// Once: the velocity (m/s, upwards) with which the soles seem to rise, when that is the state's own error. A sole may roll and slide;
+  /// the ground does not let it sink, so that soles which all do so, against all that the state knows, show a push that the IMU has not
+  /// measured.
+  std::optional<double> take_rise() { return std::exchange(rise_, std::nullopt); }
+
  private:
+  void add_rise(double up, double variance_v);
   struct Sum {
     Eigen::Vector3d way = Eigen::Vector3d::Zero();  // m
     double time = 0;                                // s
   };
   LegConfig config_;
   std::array<Sum, 2> sum_;
-  RunningStatistics across_, upwards_;  // squares, (m/s)^2
+  RunningStatistics across_, upwards_;                 // squares, (m/s)^2
+  double last_rise_ = 0, usual_rise_ = 0, rises_ = 0;  // m/s, of the average before and of the last ones; how many
+  std::optional<double> rise_;
 };
 
 }  // namespace kilvo

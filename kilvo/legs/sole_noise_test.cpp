@@ -31,5 +31,27 @@ TEST(SoleNoise, IsNeverLessThanTheSettingsSay) {
   EXPECT_EQ(noise.vertical(), config.vertical_velocity_sigma);
 }
 
+// Both feet seem to rise from the moment at which the state takes a push that there was not: the state's error, and no noise of the soles.
+TEST(SoleNoise, SolesThatAllRiseShowAnErrorOfTheState) {
+  test::Random random(3);
+  const LegConfig config;
+  SoleNoise noise(config);
+  constexpr double dt = 0.005, wrong = 0.1, sigma_v = 0.008;
+  const int samples = static_cast<int>(config.velocity_correlation / dt) + 1;
+  const auto stance = [&](std::size_t side, double rise) {
+    for (int i = 0; i < samples; ++i) {
+      const Eigen::Vector3d seen = random.vector3(0.02) + rise * Eigen::Vector3d::UnitZ();
+      noise.add(side, seen, Eigen::Vector3d::UnitZ(), dt, sigma_v);
+    }
+    noise.interrupt(side);
+    return noise.take_rise();
+  };
+  for (std::size_t k = 0; k < 30; ++k) EXPECT_FALSE(stance(k % 2, 0));
+  EXPECT_FALSE(stance(0, wrong)) << "one foot may do so of its own";
+  EXPECT_NEAR(stance(1, wrong).value_or(0), wrong, 0.01);
+  for (std::size_t k = 0; k < 30; ++k) stance(k % 2, wrong);
+  EXPECT_LT(noise.vertical(), 1.5 * config.vertical_velocity_sigma);
+}
+
 }  // namespace
 }  // namespace kilvo

@@ -194,7 +194,7 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     // Eq. 8: what moves is believed less; so is what has just arrived.
     const Eigen::Vector3d velocity = velocity_W(x, foot.point.p, foot.point.v, omega);
     const double moving2 = velocity.squaredNorm();
-    if (phase > config_.entry_delay + entry_time) noise_.add(side, velocity, -x.g.normalized(), out.dt);
+    if (phase > config_.entry_delay + entry_time) noise_.add(side, velocity, -x.g.normalized(), out.dt, sigma_v);
     const double usual2 = contacts.sole_speed * contacts.sole_speed / 3;
     const double noise2 = std::max(config_.velocity_sigma * config_.velocity_sigma, usual2) + sigma_v * sigma_v;
     const double entering = std::clamp(1.0 - (phase - config_.entry_delay) / entry_time, 0.0, 1.0);
@@ -207,6 +207,7 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     const double lighter = carries[1 - side] ? std::max(1.0, contacts.load[1 - side] / std::max(least_load, contacts.load[side])) : 1.0;
     foot.variance_scale = std::min(lighter * loose / std::max(0.01, contacts.probability[side]), loosest * loosest);
   }
+  out.rise = noise_.take_rise();
   return out;
 }
 

@@ -292,6 +292,21 @@ TEST_F(Senses, AKnockThatNoSampleShowsWholeIsNotTakenForABias) {
   EXPECT_LT(o.worst(&Moment::accel_bias, 5, 14), 0.2);
 }
 
+// On the legs alone: both feet seem to sink from then on, which no ground lets them.
+TEST_F(Senses, APushThatDidNotHappenIsFoundByTheFeet) {
+  const auto pushed = [n = 0](Measurement& m, double) mutable {
+    if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && ++n >= 1200 && n < 1204) imu->accel.z() += 15;
+    return true;
+  };
+  const std::optional<std::array<bool, sensor_count>> used(ki);
+  const Outcome whole = walk_->with({}, {used, {}, {}, {}}), o = walk_->with({}, {used, pushed, {}, {}});
+  const double as_usual = whole.worst(&Moment::error, 0, 14);
+  std::printf("a push of 0.3 m/s that did not happen: worst %.0f mm, %.0f mm without; %.1f sigmas\n", 1e3 * o.worst(&Moment::error, 0, 14),
+              1e3 * as_usual, o.worst(&Moment::sigmas, 1, 14));
+  EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.15);
+  EXPECT_LT(o.worst(&Moment::sigmas, 1, 14), 4.0);
+}
+
 // It is told with its reason, sensor by sensor, what came before an IMU that never came; and no more of it waits than a few seconds.
 TEST_F(Senses, WithoutAnyImuMessageAllElseIsDroppedAndTold) {
   Estimator estimator(walk_->settings().robot, walk_->settings().estimator, walk_->used());
