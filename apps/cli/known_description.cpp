@@ -103,7 +103,12 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
     std::vector<WrongDescription> again;
     for (const lab::Finding& f : longer.findings) again.push_back(lab::as_wrong(f, first.t, first.after));
     if (std::ranges::any_of(again, [&](const WrongDescription& w) { return known.stops(w); })) wrong = again;
-    if (longer.is_right()) std::ranges::for_each(wrong, lab::refute);
+    if (longer.settled) {
+      for (WrongDescription& w : wrong) {
+        const auto is_same = [&w](const WrongDescription& other) { return other.finding.cause == w.finding.cause; };
+        if (std::ranges::none_of(again, is_same)) lab::refute(w);
+      }
+    }
     for (const WrongDescription& w : wrong) {
       if (known.stops(w)) lab::put(known.mended, w.finding.changes);
     }

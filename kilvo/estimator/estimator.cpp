@@ -176,6 +176,12 @@ Findings::Situation Estimator::situation() const {
           legs_.leg_length()};
 }
 
+PoseCovariance Estimator::common_error_at(const State& x) const {
+  PoseCovariance out = map_.error_at(x.pose()) + lidar_.mount_error_at(x.pose());
+  if (status_.modality() == Modality::ki) out += legs_.description_error(x);
+  return out;
+}
+
 void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts, double kinematic_us,
                      double contact_us) {
   auto o = outputs_.next(e.t);
@@ -183,7 +189,7 @@ void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<
   o->epoch = epoch();
   o->x = e.x;
   o->P = e.P;
-  o->P.topLeftCorner<6, 6>() += shared_error_at(e.x.pose());
+  o->P.topLeftCorner<6, 6>() += common_error_at(e.x);
   if (history_.replay().has_imu()) o->omega = history_.replay().newest_imu().gyro - e.x.bg;
   o->modality = status_.modality();
   o->cause = status_.cause();
@@ -196,7 +202,7 @@ void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<
 
 bool Estimator::fork(LivePropagator& into) const {
   if (!history_.has_begun() || !history_.replay().has_imu()) return false;
-  into.become(history_, legs_, imu_, status_, shared_error_at(history_.now().x.pose()), epoch());
+  into.become(history_, legs_, imu_, status_, common_error_at(history_.now().x), epoch());
   return true;
 }
 

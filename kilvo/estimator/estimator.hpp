@@ -93,7 +93,7 @@ class Estimator {
   bool must_settle(Sensor s, Time t);
   Findings::Situation situation() const;
   /// Of a pose there relative to the first, which the filter's covariance lacks: it is of the pose in the map around.
-  PoseCovariance shared_error_at(const SE3& T_WI) const { return map_.error_at(T_WI) + lidar_.mount_error_at(T_WI); }
+  PoseCovariance common_error_at(const State& x) const;
   void emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0,
             double contact_us = 0);
 

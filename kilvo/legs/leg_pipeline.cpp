@@ -29,6 +29,11 @@ LegPipeline::LegUpdate LegPipeline::measure(const Feet& feet, const Estimate& pr
   contacts_.adapt(out.step, x, imu.gyro, ground);
   // Where the LiDAR gives the velocity, soles that rise are not the state's doing.
   if (!on_legs_alone) out.step.rise.reset();
+  if (on_legs_alone) {
+    reckoning_.add(x);
+  } else {
+    reckoning_.restart();
+  }
   return out;
 }
 

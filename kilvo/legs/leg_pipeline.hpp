@@ -6,6 +6,7 @@
 
 #include "kilvo/filter/state.hpp"
 #include "kilvo/legs/contact_detector.hpp"
+#include "kilvo/legs/dead_reckoning.hpp"
 #include "kilvo/legs/stance_tracker.hpp"
 
 namespace kilvo {
@@ -40,6 +41,8 @@ class LegPipeline {
   Time last_used_stance() const { return last_used_stance_; }
 
   const Contacts& contacts() const { return contacts_.contacts(); }
+  /// On the legs alone: by how much the pose of `x` may be off because the robot is not quite as described.
+  PoseCovariance description_error(const State& x) const { return reckoning_.error(x); }
 
   /// After a gap in the legs' messages, or of the estimate: nothing of before is known to be true.
   void restart();
@@ -51,6 +54,7 @@ class LegPipeline {
   Time last_used_stance_{};  // when a foot was used last
   Time last_stance_{};       // the same, or since when that is waited for
   double leg_length_ = 1;    // m
+  DeadReckoning reckoning_;
 };
 
 }  // namespace kilvo

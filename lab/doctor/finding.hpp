@@ -49,8 +49,6 @@ struct Diagnosis {
   std::vector<Check> checks;
   bool settled = false;  // each sense that is there moved enough to be judged
   bool good() const { return findings.empty(); }
-  /// Not only good: nothing was left open either.
-  bool is_right() const { return good() && settled; }
   /// Nothing could be judged at all.
   bool unknown() const;
 };

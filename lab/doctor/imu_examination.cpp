@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
+#include <numeric>
 
 #include "lab/doctor/examination.hpp"
 
@@ -17,6 +18,18 @@ double median_norm(const std::vector<InertialSample>& imu) {
   const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
   std::ranges::nth_element(norms, middle);
   return *middle;
+}
+
+bool is_far_from_one(double scale) { return scale > 1.15 || scale < 0.87; }
+
+// In either half of the turning: sweeps that are registered badly for a while, as those of a runner are, turn too little only so long.
+bool is_far_throughout(const std::vector<Turn>& turns, const GyroPath& path, double offset) {
+  const auto squared = [](double sum, const Turn& turn) { return sum + turn.theta[0].squaredNorm(); };
+  const double all = std::accumulate(turns.begin(), turns.end(), 0.0, squared);
+  auto middle = turns.begin();
+  for (double sum = 0; middle != turns.end() && sum < 0.5 * all; ++middle) sum = squared(sum, *middle);
+  const double first = agree({turns.begin(), middle}, path, offset).scale, second = agree({middle, turns.end()}, path, offset).scale;
+  return is_far_from_one(first) && is_far_from_one(second) && (first > 1) == (second > 1);
 }
 
 bool is_identity(const Eigen::Matrix3d& m) { return m.isApprox(Eigen::Matrix3d::Identity(), 1e-9); }
@@ -112,7 +125,7 @@ void Examination::agree_with_gyro() {
       lidar_turns_.push_back({a.t, b.t, {(a.T_WL.R.inverse() * b.T_WL.R).Log(), Eigen::Vector3d::Zero()}, 1});
   }
   lidar_ = agreement(lidar_turns_, robot_.lidar.T_imu_lidar.R, 0.8);
-  if (lidar_.known && (lidar_.scale > 1.15 || lidar_.scale < 0.87)) {
+  if (lidar_.known && is_far_from_one(lidar_.scale) && is_far_throughout(lidar_turns_, gyro(), lidar_.offset)) {
     const bool deg = std::abs(lidar_.scale / per_degree - 1) < 0.15;
     const double factor = deg ? per_degree : lidar_.scale;
     gyro_axes_ /= factor;

@@ -135,6 +135,13 @@ class WayOfLegs {
   std::vector<double> ratios_, heights_;
 };
 
+std::string detail_of(double scale, double sigma, std::size_t windows, const std::optional<double>& height) {
+  return fmt::format(
+      "way by the legs / way by the LiDAR {:.3f}, standard deviation {:.3f}, in {} s; height of the LiDAR by the legs less that by its "
+      "points {}",
+      scale, sigma, windows, height ? fmt::format("{:.1f} cm", 100 * *height) : "unknown");
+}
+
 }  // namespace
 
 Examination::LegWay Examination::measure_leg_way(const LegHypothesis* hypothesis) const {
@@ -190,11 +197,17 @@ void Examination::examine_leg_lengths() {
   // The feet that stand tell it better than the way over soles that roll; a place of the IMU that is wrong would spoil that, and show as a
   // height that these legs do not explain.
   double scale = by_way;
+  const double legs = legs_under(nullptr).front().foot[0].p[0].norm();
+  const auto explains = [&](double s) {
+    return !height || std::abs(*height - (s - 1) * legs) < std::max(leg_height_tolerance, 0.5 * std::abs(s - 1) * legs);
+  };
   bool scale_wrong = std::abs(scale - 1) > std::max(scale_tolerance, sure * sigma);
+  if (scale_wrong && accuse_exchanged_legs(scale, detail_of(scale, sigma, windows, height))) return;
+  // A robot that runs, slips or rolls over its soles goes farther than they say, and stands as high as described.
+  if (!explains(scale)) scale_wrong = false;
   if (stances_ && !scale_wrong) {
-    const double by_stances = 1 / stances_->scale, legs = legs_under(nullptr).front().foot[0].p[0].norm();
-    const bool explains = !height || std::abs(*height - (by_stances - 1) * legs) < leg_height_tolerance;
-    if (explains && std::abs(by_stances - 1) > std::max(stance_tolerance, sure * stances_->scale_sigma)) {
+    const double by_stances = 1 / stances_->scale;
+    if (explains(by_stances) && std::abs(by_stances - 1) > std::max(stance_tolerance, sure * stances_->scale_sigma)) {
       scale = by_stances;
       scale_wrong = true;
     }
@@ -202,15 +215,11 @@ void Examination::examine_leg_lengths() {
   // A LiDAR that was found elsewhere is known to some centimetres only.
   const bool moved = std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "lidar_position"; });
   const bool height_wrong = height && std::abs(*height) > (moved ? 3 : 1) * leg_height_tolerance;
-  const std::string detail = fmt::format(
-      "way by the legs / way by the LiDAR {:.3f}, standard deviation {:.3f}, in {} s; height of the LiDAR by the legs less that by its "
-      "points {}",
-      scale, sigma, windows, height ? fmt::format("{:.1f} cm", 100 * *height) : "unknown");
+  const std::string detail = detail_of(scale, sigma, windows, height);
   if (!scale_wrong && !height_wrong) {
     check(Sensor::legs, "lengths of the legs", std::isfinite(sigma) ? Check::Verdict::good : Check::Verdict::unknown, detail);
     return;
   }
-  if (scale_wrong && accuse_exchanged_legs(scale, detail)) return;
   // Legs that are too long walk too far and stand too high; an IMU that is too high only stands too high.
   const bool lengths = height_wrong ? (scale - 1) * *height > 0 && std::abs(scale - 1) > 0.02 : true;
   if (lengths) {
