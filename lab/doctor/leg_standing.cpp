@@ -60,7 +60,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   const Standing described = stands(nullptr);
   double most = std::max(longer_than, clearly * described.worth() + least_standing), longer = clearly * described.both();
   // Soles that stand that long leave no room for others that would stand clearly longer, but for those on links above the ankles.
-  constexpr double well = 0.45, as_feet_do = 0.28;  // of the time in which the robot moves
+  constexpr double well = 0.45, as_feet_do = 0.35;  // of the time in which the robot moves
   std::vector<LegHypothesis> all;
   if (described.worth() < well * described.moving) all = leg_hypotheses(recorded_legs_, robot_);
   if (described.worth() < least_standing) {
