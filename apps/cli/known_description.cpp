@@ -108,6 +108,8 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
         const auto is_same = [&w](const WrongDescription& other) { return other.finding.cause == w.finding.cause; };
         if (std::ranges::none_of(again, is_same)) lab::refute(w);
       }
+      if (!std::ranges::any_of(wrong, [&](const WrongDescription& w) { return known.stops(w); }))
+        known.wrong.insert(known.wrong.end(), again.begin(), again.end());
     }
     for (const WrongDescription& w : wrong) {
       if (known.stops(w)) lab::put(known.mended, w.finding.changes);

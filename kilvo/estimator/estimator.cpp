@@ -178,7 +178,7 @@ Findings::Situation Estimator::situation() const {
 
 PoseCovariance Estimator::common_error_at(const State& x) const {
   PoseCovariance out = map_.error_at(x.pose()) + lidar_.mount_error_at(x.pose());
-  if (status_.modality() == Modality::ki) out += legs_.description_error(x);
+  if (!has_lidar(status_.modality())) out += legs_.description_error(x);
   return out;
 }
 

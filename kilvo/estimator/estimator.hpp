@@ -92,7 +92,8 @@ class Estimator {
   bool is_settled(Time t) const { return settles_nothing_ || imu_.is_calm(t, std::chrono::milliseconds(20)); }
   bool must_settle(Sensor s, Time t);
   Findings::Situation situation() const;
-  /// Of a pose there relative to the first, which the filter's covariance lacks: it is of the pose in the map around.
+  /// What the filter's covariance lacks of the error relative to the first pose: of the map, of the LiDAR's mount, of the legs'
+  /// description.
   PoseCovariance common_error_at(const State& x) const;
   void emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0,
             double contact_us = 0);

@@ -78,6 +78,7 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
   history_.advance_to(end);
   findings_.use(Sensor::lidar);
   if (sweep.carries) status_.sweep_used(end);
+  if (sweep.carries && !first) legs_.pose_is_measured();
   choose_modality(end);
   frames_.scan_used(middle);
   result.registration = sweep.report;

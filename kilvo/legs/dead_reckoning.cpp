@@ -9,7 +9,7 @@ constexpr double mount = 0.01, length = 0.01, gyro_scale = 0.003;
 }  // namespace
 
 void DeadReckoning::add(const State& x) {
-  if (!x.p.allFinite() || !x.R.matrix().allFinite()) return;  // a state that is thrown away
+  if (!x.p.allFinite() || !x.R.matrix().allFinite() || !x.g.allFinite()) return;  // a state that is thrown away
   if (last_) {
     const Eigen::Vector3d up_W = -x.g.normalized(), step = x.p - last_->p;
     turned_ += up_W.dot(last_->R * (last_->R.inverse() * x.R).Log());

@@ -1,7 +1,7 @@
-// How far the pose may be off because a robot is never quite what its description says, while nothing but its legs and gyro carry it: the
-// mount of the IMU on the legs' link, the lengths of the legs, the scale of the gyro. Such an error is the same at every step, so that no
-// noise stands for it: it grows with the way, and a way back undoes it in part. The three are parameters that are considered, not estimated
-// (Schmidt 1966): their effect on the pose is summed up along the way.
+// How far the pose may be off because a robot is never quite what its description says, while only its legs and gyro measure its motion:
+// the mount of the IMU on the legs' link, the lengths of the legs, the scale of the gyro. Such an error is the same at every step, so that
+// no noise term models it: it grows with the way, and a way back undoes it in part. The three are parameters that are considered, not
+// estimated (Schmidt 1966): their effect on the pose is summed up along the way.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +17,7 @@ class DeadReckoning {
   void restart() { *this = {}; }
   /// The next state of a way on the legs alone.
   void add(const State& x);
-  /// To be added to the covariance of `x`, whose pose was added last.
+  /// To be added to the covariance of `x`, a state at or after the last one that was added.
   PoseCovariance error(const State& x) const;
 
  private:

@@ -25,15 +25,10 @@ LegPipeline::LegUpdate LegPipeline::measure(const Feet& feet, const Estimate& pr
   Stopwatch watch;
   contacts_.update(feet, x, omega, imu.accel - x.ba, sigma_v, map);
   out.contact_us = watch.lap_us();
+  stances_.set_on_legs_alone(on_legs_alone);
   out.step = stances_.step(feet, contacts_.contacts(), x, omega, sigma_v, map, ground);
   contacts_.adapt(out.step, x, imu.gyro, ground);
-  // Where the LiDAR gives the velocity, soles that rise are not the state's doing.
-  if (!on_legs_alone) out.step.rise.reset();
-  if (on_legs_alone) {
-    reckoning_.add(x);
-  } else {
-    reckoning_.restart();
-  }
+  if (on_legs_alone) reckoning_.add(x);
   return out;
 }
 

@@ -41,6 +41,8 @@ class LegPipeline {
   Time last_used_stance() const { return last_used_stance_; }
 
   const Contacts& contacts() const { return contacts_.contacts(); }
+  /// The pose is measured by something else.
+  void pose_is_measured() { reckoning_.restart(); }
   /// On the legs alone: by how much the pose of `x` may be off because the robot is not quite as described.
   PoseCovariance description_error(const State& x) const { return reckoning_.error(x); }
 

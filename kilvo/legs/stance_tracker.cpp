@@ -72,6 +72,7 @@ void StanceTracker::restart() {
     weights_[side].reset();
   }
   last_.reset();
+  noise_.restart();
 }
 
 void StanceTracker::judge(const LegStep& step, const std::array<bool, 2>& passed) {
@@ -194,7 +195,8 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     // Eq. 8: what moves is believed less; so is what has just arrived.
     const Eigen::Vector3d velocity = velocity_W(x, foot.point.p, foot.point.v, omega);
     const double moving2 = velocity.squaredNorm();
-    if (phase > config_.entry_delay + entry_time) noise_.add(side, velocity, -x.g.normalized(), out.dt, sigma_v);
+    if (phase > config_.entry_delay + entry_time)
+      noise_.add(side, velocity, -x.g.normalized(), out.dt, on_legs_alone_ ? std::optional(sigma_v) : std::nullopt);
     const double usual2 = contacts.sole_speed * contacts.sole_speed / 3;
     const double noise2 = std::max(config_.velocity_sigma * config_.velocity_sigma, usual2) + sigma_v * sigma_v;
     const double entering = std::clamp(1.0 - (phase - config_.entry_delay) / entry_time, 0.0, 1.0);

@@ -22,8 +22,12 @@ double median_norm(const std::vector<InertialSample>& imu) {
 
 bool is_far_from_one(double scale) { return scale > 1.15 || scale < 0.87; }
 
-// In either half of the turning: sweeps that are registered badly for a while, as those of a runner are, turn too little only so long.
+// In both halves of the turning, unless it is a unit: sweeps that are registered badly for a while, as those of a runner are, turn too
+// little only so long.
 bool is_far_throughout(const std::vector<Turn>& turns, const GyroPath& path, double offset) {
+  constexpr double unit = 1.5;  // and more
+  const double whole = agree(turns, path, offset).scale;
+  if (whole > unit || whole < 1 / unit) return true;
   const auto squared = [](double sum, const Turn& turn) { return sum + turn.theta[0].squaredNorm(); };
   const double all = std::accumulate(turns.begin(), turns.end(), 0.0, squared);
   auto middle = turns.begin();

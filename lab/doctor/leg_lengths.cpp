@@ -199,12 +199,16 @@ void Examination::examine_leg_lengths() {
   double scale = by_way;
   const double legs = legs_under(nullptr).front().foot[0].p[0].norm();
   const auto explains = [&](double s) {
-    return !height || std::abs(*height - (s - 1) * legs) < std::max(leg_height_tolerance, 0.5 * std::abs(s - 1) * legs);
+    const double expected = (1 - 1 / s) * legs;
+    return !height || std::abs(*height - expected) < std::max(leg_height_tolerance, 0.5 * std::abs(expected));
   };
   bool scale_wrong = std::abs(scale - 1) > std::max(scale_tolerance, sure * sigma);
   if (scale_wrong && accuse_exchanged_legs(scale, detail_of(scale, sigma, windows, height))) return;
-  // A robot that runs, slips or rolls over its soles goes farther than they say, and stands as high as described.
-  if (!explains(scale)) scale_wrong = false;
+  // The way of a robot that runs, slips or rolls over its soles is not that of its legs, but it stands as high as described.
+  if (!explains(scale)) {
+    scale = 1;
+    scale_wrong = false;
+  }
   if (stances_ && !scale_wrong) {
     const double by_stances = 1 / stances_->scale;
     if (explains(by_stances) && std::abs(by_stances - 1) > std::max(stance_tolerance, sure * stances_->scale_sigma)) {

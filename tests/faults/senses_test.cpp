@@ -292,7 +292,7 @@ TEST_F(Senses, AKnockThatNoSampleShowsWholeIsNotTakenForABias) {
   EXPECT_LT(o.worst(&Moment::accel_bias, 5, 14), 0.2);
 }
 
-// On the legs alone: both feet seem to sink from then on, which no ground lets them.
+// On the legs alone: both feet seem to rise from then on, which the ground does not let them.
 TEST_F(Senses, APushThatDidNotHappenIsFoundByTheFeet) {
   const auto pushed = [n = 0](Measurement& m, double) mutable {
     if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && ++n >= 1200 && n < 1204) imu->accel.z() += 15;
