@@ -205,7 +205,8 @@ void Examination::examine_leg_lengths() {
   bool scale_wrong = std::abs(scale - 1) > std::max(scale_tolerance, sure * sigma);
   if (scale_wrong && accuse_exchanged_legs(scale, detail_of(scale, sigma, windows, height))) return;
   // The way of a robot that runs, slips or rolls over its soles is not that of its legs, but it stands as high as described.
-  if (!explains(scale)) {
+  const bool slips = scale_wrong && !explains(scale);
+  if (slips) {
     scale = 1;
     scale_wrong = false;
   }
@@ -219,9 +220,10 @@ void Examination::examine_leg_lengths() {
   // A LiDAR that was found elsewhere is known to some centimetres only.
   const bool moved = std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "lidar_position"; });
   const bool height_wrong = height && std::abs(*height) > (moved ? 3 : 1) * leg_height_tolerance;
-  const std::string detail = detail_of(scale, sigma, windows, height);
+  const std::string detail = detail_of(scale_wrong ? scale : by_way, sigma, windows, height);
   if (!scale_wrong && !height_wrong) {
-    check(Sensor::legs, "lengths of the legs", std::isfinite(sigma) ? Check::Verdict::good : Check::Verdict::unknown, detail);
+    const Check::Verdict verdict = slips ? Check::Verdict::note : Check::Verdict::good;
+    check(Sensor::legs, "lengths of the legs", std::isfinite(sigma) ? verdict : Check::Verdict::unknown, detail);
     return;
   }
   // Legs that are too long walk too far and stand too high; an IMU that is too high only stands too high.
