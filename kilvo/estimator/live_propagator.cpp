@@ -16,12 +16,12 @@ LivePropagator::LivePropagator(const Robot& robot, const EstimatorConfig& config
       status_(robot, false) {}
 
 void LivePropagator::become(const History& history, const LegPipeline& legs, const ImuWatch& imu, const SensorStatus& status,
-                            const PoseCovariance& map_error, std::uint32_t epoch) {
+                            const PoseCovariance& common_error, std::uint32_t epoch) {
   history_.fork_from(history);
   legs_ = legs;
   imu_ = imu;
   status_ = status;
-  map_error_ = map_error;
+  common_error_ = common_error;
   epoch_ = epoch;
   started_ = true;
   with_legs_ = false;
@@ -86,7 +86,7 @@ Output LivePropagator::output() const {
   o.epoch = epoch_;
   o.x = e.x;
   o.P = e.P;
-  o.P.topLeftCorner<6, 6>() += map_error_;
+  o.P.topLeftCorner<6, 6>() += common_error_;
   o.omega = history_.replay().newest_imu().gyro - e.x.bg;
   o.modality = status_.modality();
   o.cause = status_.cause();

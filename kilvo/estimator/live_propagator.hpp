@@ -35,9 +35,10 @@ class LivePropagator {
   /// Measurements of earlier stamps are of no use to it.
   Time known() const { return history_.closed().t; }
 
-  /// Goes on from the estimator's present state; `map_error`: of the map around there. Allocates only when it has never held so much.
+  /// Goes on from the estimator's present state; `common_error`: what its covariance lacks (Estimator::common_error_at). Allocates only
+  /// when it has never held so much.
   void become(const History& history, const LegPipeline& legs, const ImuWatch& imu, const SensorStatus& status,
-              const PoseCovariance& map_error, std::uint32_t epoch);
+              const PoseCovariance& common_error, std::uint32_t epoch);
 
  private:
   void close(Time until);
@@ -49,7 +50,7 @@ class LivePropagator {
   LegPipeline legs_;
   ImuWatch imu_;
   SensorStatus status_;
-  PoseCovariance map_error_ = PoseCovariance::Zero();
+  PoseCovariance common_error_ = PoseCovariance::Zero();
   std::uint32_t epoch_ = 0;
   Duration lag_{};                            // see expect_legs_after
   bool with_legs_ = false;                    // the newest output is of a leg sample

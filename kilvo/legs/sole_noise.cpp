@@ -46,8 +46,7 @@ void SoleNoise::add_rise(std::size_t side, double up, double variance_v) {
   // What both feet show, beyond three standard deviations.
   constexpr double beyond = 9;
   const double variance = vertical() * vertical();
-  const double other = last_rise_[1 - side].value_or(0),
-               both = up * other > 0 ? std::copysign(std::min(std::abs(up), std::abs(other)), up) : 0;
+  const double other = last_rise_[1 - side].value_or(0), both = up * other > 0 ? std::min(std::abs(up), std::abs(other)) : 0;
   last_rise_[side] = up;
   if (both * both > beyond * (variance_v + 0.5 * variance)) {
     rise_ = 0.5 * (up + other);
