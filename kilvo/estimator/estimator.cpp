@@ -177,9 +177,7 @@ Findings::Situation Estimator::situation() const {
 }
 
 PoseCovariance Estimator::common_error_at(const State& x) const {
-  PoseCovariance out = map_.error_at(x.pose()) + lidar_.mount_error_at(x.pose());
-  if (!has_lidar(status_.modality())) out += legs_.description_error(x);
-  return out;
+  return map_.error_at(x.pose()) + lidar_.mount_error_at(x.pose()) + legs_.description_error(x);
 }
 
 void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts, double kinematic_us,

@@ -70,6 +70,7 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
     history_.correct_trajectory(sweep.posterior, sweep.posterior.x.v - prior.x.v);
     lidar_.accept(sweep);
     if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior);
+    if (first) map_.begin_at(sweep.posterior.x.pose(), legs_.description_error(sweep.posterior.x));
     map_.learn(sweep, lidar_.unobservable(), lidar_.may_learn(prior, sweep, map_error));
     history_.rebase(sweep.posterior);
   }
@@ -78,7 +79,9 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
   history_.advance_to(end);
   findings_.use(Sensor::lidar);
   if (sweep.carries) status_.sweep_used(end);
-  if (sweep.carries && !first) legs_.pose_is_measured();
+  // Images hold what no sweep does: better than the legs do.
+  if (sweep.carries && !first && !(lidar_.is_blind_somewhere() && has_camera(status_.modality())))
+    legs_.pose_is_measured(lidar_.unobservable().bottomRightCorner<3, 3>());
   choose_modality(end);
   frames_.scan_used(middle);
   result.registration = sweep.report;

@@ -30,6 +30,8 @@ class WorldMap {
   void held_against(const SE3& T_WI, std::span<const EarlierView> views, const PoseCovariance& unobservable) {
     error_.seen(T_WI, views, unobservable);
   }
+  /// The first sweep: the pose there is wrong by so much more than the filter knows.
+  void begin_at(const SE3& T_WI, const PoseCovariance& more) { error_.lost(T_WI, more); }
   /// The robot is outside of the map, farther away than a search would have looked: the map begins anew around `e`.
   void begin_anew(const Estimate& e);
 

@@ -13,11 +13,18 @@ constexpr Duration longest_flight = std::chrono::milliseconds(500);
 
 }  // namespace
 
-LegPipeline::LegUpdate LegPipeline::measure(const Feet& feet, const Estimate& predicted, const ImuSample& imu, const VoxelMap* map,
+LegPipeline::LegUpdate LegPipeline::measure(Feet feet, const Estimate& predicted, const ImuSample& imu, const VoxelMap* map,
                                             StanceTracker::Ground ground) {
   LegUpdate out;
   const bool on_legs_alone = ground == StanceTracker::Ground::use;
   if (always_height_) ground = StanceTracker::Ground::use;
+  const Eigen::Matrix3d& M = motion_error_.matrix();
+  for (FootPose& foot : feet.foot) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(foot.corners); ++k) {
+      foot.p[k] -= M * foot.p[k];
+      foot.v[k] -= M * foot.v[k];
+    }
+  }
   leg_length_ = std::max(leg_length_, feet.foot[0].p[0].norm());
   const State& x = predicted.x;
   const Eigen::Vector3d omega = imu.gyro - x.bg;
@@ -28,7 +35,15 @@ LegPipeline::LegUpdate LegPipeline::measure(const Feet& feet, const Estimate& pr
   stances_.set_on_legs_alone(on_legs_alone);
   out.step = stances_.step(feet, contacts_.contacts(), x, omega, sigma_v, map, ground);
   contacts_.adapt(out.step, x, imu.gyro, ground);
-  if (on_legs_alone) reckoning_.add(x);
+  // As the filter sees it: the standing feet by their weights.
+  Eigen::Vector3d velocity_I = Eigen::Vector3d::Zero();
+  double weight = 0;
+  for (const Stance& foot : out.step.foot) {
+    if (!foot.used) continue;
+    weight += 1 / foot.variance_scale;
+    velocity_I -= (omega.cross(foot.point.p) + foot.point.v) / foot.variance_scale;
+  }
+  motion_error_.add(x, velocity_I / std::max(weight, 1e-9), weight, out.step.dt, on_legs_alone);
   return out;
 }
 

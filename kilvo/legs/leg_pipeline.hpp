@@ -6,7 +6,7 @@
 
 #include "kilvo/filter/state.hpp"
 #include "kilvo/legs/contact_detector.hpp"
-#include "kilvo/legs/dead_reckoning.hpp"
+#include "kilvo/legs/leg_motion_error.hpp"
 #include "kilvo/legs/stance_tracker.hpp"
 
 namespace kilvo {
@@ -22,7 +22,7 @@ class LegPipeline {
     LegStep step;
     double contact_us = 0;  // the contacts' part of the time
   };
-  LegUpdate measure(const Feet& feet, const Estimate& predicted, const ImuSample& imu, const VoxelMap* map, StanceTracker::Ground ground);
+  LegUpdate measure(Feet feet, const Estimate& predicted, const ImuSample& imu, const VoxelMap* map, StanceTracker::Ground ground);
 
   /// Which feet of the step were used, and not refused.
   void judge(const LegStep& step, const std::array<bool, 2>& passed) { stances_.judge(step, passed); }
@@ -41,10 +41,10 @@ class LegPipeline {
   Time last_used_stance() const { return last_used_stance_; }
 
   const Contacts& contacts() const { return contacts_.contacts(); }
-  /// The pose is measured by something else.
-  void pose_is_measured() { reckoning_.restart(); }
-  /// On the legs alone: by how much the pose of `x` may be off because the robot is not quite as described.
-  PoseCovariance description_error(const State& x) const { return reckoning_.error(x); }
+  /// Something else has measured the pose, see LegMotionError.
+  void pose_is_measured(const Eigen::Matrix3d& unknown) { motion_error_.pose_is_measured(unknown); }
+  /// By how much the pose of `x` may be off because the robot is not quite as described.
+  PoseCovariance description_error(const State& x) const { return motion_error_.error(x); }
 
   /// After a gap in the legs' messages, or of the estimate: nothing of before is known to be true.
   void restart();
@@ -56,7 +56,7 @@ class LegPipeline {
   Time last_used_stance_{};  // when a foot was used last
   Time last_stance_{};       // the same, or since when that is waited for
   double leg_length_ = 1;    // m
-  DeadReckoning reckoning_;
+  LegMotionError motion_error_;
 };
 
 }  // namespace kilvo
