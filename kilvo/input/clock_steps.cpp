@@ -35,6 +35,7 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
   const bool waits = must_wait(now);
   if (!alone_ahead && waits) return Reason::time_jump;
   if (near && !alone_ahead) {
+    if (imu_ && now - *imu_ > 5 * period_ / 2) note_hole(now);
     if (imu_ && now > *imu_) period_ = std::min(now - *imu_, period_ + period_ / 8);
     // The most of lately: less, when the IMU comes late.
     if (legs_) legs_behind_ = std::max(now - *legs_, legs_behind_.value_or(now - *legs_) - period_ / 512);
@@ -43,6 +44,7 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
     imu_ = std::max(imu_.value_or(now), now);
     return std::nullopt;
   }
+  if (is_late(now)) return Reason::late;
   const bool goes_on = elsewhere_ > 0 && now > newest_there_ && now - newest_there_ < longest_interval;
   if (!goes_on) {
     first_there_ = now;
@@ -58,7 +60,7 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
   if (!back && !alone_ahead && elsewhere_ < witnesses) return std::nullopt;
   const int there = std::exchange(elsewhere_, 0);
   // Ahead with all the others, it is a gap, or a mistake: the timeline looks into that.
-  if (!back && !(alone_ahead && seconded)) return imu_ = now, std::nullopt;
+  if (!back && !(alone_ahead && seconded)) return note_hole(first_there_), imu_ = now, std::nullopt;
   // Nothing is missing: the first of them came one period after the newest before.
   const Duration period = (now - first_there_) / (there - 1);
   last_ = *imu_ + period - first_there_;
@@ -85,6 +87,11 @@ void ClockSteps::restart(Time imu) {
 bool ClockSteps::is_sure() const {
   const bool alone = std::ranges::none_of(lag_, [](const auto& lag) { return lag.has_value(); });
   return alone || for_ + against_ > 0 || newest_there_ - first_there_ > patience;
+}
+
+// What was missing comes late: a time that had gone back would repeat stamps that were there.
+bool ClockSteps::is_late(Time now) const {
+  return std::ranges::any_of(holes_, [now](const auto& hole) { return hole.first < now && now < hole.second; });
 }
 
 // A stamp of the IMU lies ahead by more than a missing sample or jitter makes: after a gap the next one goes on from there, else it is

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "kilvo/sensors/measurement.hpp"
 #include "kilvo/sensors/reason.hpp"
@@ -33,6 +34,8 @@ class ClockSteps {
   bool is_sure() const;
   bool has_run_ahead(Time now) const;
   bool must_wait(Time now);
+  void note_hole(Time until) { holes_[next_hole_++ % holes_.size()] = {*imu_, until}; }
+  bool is_late(Time now) const;
   void restart(Time imu);
   void put(Measurement& m, std::size_t s) const;
   void vote(std::size_t s, Time t);
@@ -45,7 +48,9 @@ class ClockSteps {
   std::array<std::optional<Time>, sensor_count> open_until_;
   std::array<std::optional<Time>, sensor_count> newest_;  // of each, with its offset
   std::optional<Time> imu_;                               // the newest, with its offset
-  std::optional<Time> suspect_;                           // a stamp of the IMU ahead of what was due
+  std::array<std::pair<Time, Time>, 4> holes_{};          // between stamps of the IMU, the last ones
+  std::size_t next_hole_ = 0;
+  std::optional<Time> suspect_;  // a stamp of the IMU ahead of what was due
   bool went_on_ = false;
   Duration period_ = std::chrono::seconds(1);  // of the IMU, lately
   std::optional<Time> legs_;                   // the newest, with its offset

@@ -239,6 +239,30 @@ TEST(ClockSteps, AGapOfTheImuWhileOthersGoOnCostsNothing) {
   EXPECT_EQ(r.refused, 0);
 }
 
+// What was missing comes 0.3 s late, while what should come now is late as well: a time that had gone back would repeat what was there.
+TEST(ClockSteps, WhatFillsAGapIsLateAndNoStep) {
+  Robot r;
+  r.walk(seconds(2), {}, {});
+  const Duration gap = r.now;
+  const auto walk_without_imu = [&](Duration how_long, std::optional<Duration> late) {
+    for (const Duration end = r.now + how_long; r.now < end; r.now += milliseconds(1)) {
+      if (late && r.now % milliseconds(5) == Duration(0)) {
+        Measurement sample = ImuSample{.t = at(r.now - *late)};
+        EXPECT_EQ(r.clocks.follow(sample), Reason::late);
+      }
+      JointSample joints;
+      joints.t = at(r.now - milliseconds(3));
+      r.note(joints, r.now - milliseconds(3), r.worst_legs);
+    }
+  };
+  walk_without_imu(milliseconds(100), {});
+  r.walk(milliseconds(200), {}, {});
+  walk_without_imu(milliseconds(95), r.now - gap);
+  r.walk(seconds(2), {}, {});
+  EXPECT_EQ(r.clocks.count(), 0u);
+  EXPECT_EQ(r.worst_imu, Duration(0));
+}
+
 TEST(ClockSteps, ARecordingThatIsPlayedAgainIsARestartWithItsOwnStamps) {
   Robot r;
   r.walk(seconds(60), {}, {});

@@ -69,8 +69,9 @@ TEST(Schedules, OfRandomFailuresAreOutlived) {
     bad += good ? 0 : 1;
     EXPECT_TRUE(good) << "schedule " << n << ": " << last.error << " m, " << last.sigmas << " sigmas and " << last.tilt_sigmas
                       << " of attitude at the end, " << lies << " and " << tilted << " of " << o.moments.size()
-                      << " outputs beyond six sigmas (" << o.worst(&test::Moment::sigmas, 1, seconds) << ", "
-                      << o.worst(&test::Moment::tilt_sigmas, 1, seconds) << "):" << words(failures);
+                      << " outputs beyond six sigmas (" << o.worst(&test::Moment::sigmas, 1, seconds) << " at "
+                      << o.when_worst(&test::Moment::sigmas, 1, seconds) << " s, " << o.worst(&test::Moment::tilt_sigmas, 1, seconds)
+                      << " at " << o.when_worst(&test::Moment::tilt_sigmas, 1, seconds) << " s):" << words(failures);
   }
   std::printf("%d of %d schedules good\n", count - bad, count);
 }
