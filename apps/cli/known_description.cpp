@@ -84,9 +84,8 @@ KnownDescription refined(const lab::Settings& settings, const RunOptions& option
       return known;
     }
     for (const lab::Finding& f : now.diagnosis.findings) {
-      const WrongDescription wrong = lab::as_wrong(f, Time{}, 0);
-      // That is for the run to find, and to end with.
-      if (wrong.spoils || !wrong.is_mendable) return {};
+      // That is for the run to find, and to end with. Clocks that the estimator would correct by itself are corrected from the start.
+      if (lab::as_wrong(f, Time{}, 0).spoils || f.changes.empty()) return {};
       lab::put(known.refined, f.changes);
     }
   }

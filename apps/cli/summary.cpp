@@ -71,7 +71,6 @@ Json health_json(const RunFacts& facts, const Statistics& statistics) {
 
 // One for each sensor and reason, as it was last.
 Json events_json(const Statistics& statistics, const std::optional<Event>& levelled) {
-  constexpr const char* severities[] = {"notice", "warning", "error"};
   std::vector<Event> events = statistics.events;
   if (levelled) events.push_back(*levelled);
   Json out = Json::array();
@@ -79,7 +78,7 @@ Json events_json(const Statistics& statistics, const std::optional<Event>& level
     out.push_back({{"t", to_seconds(e.t.time_since_epoch())},
                    {"sensor", e.sensor ? Json(name_of(*e.sensor)) : Json()},
                    {"reason", name_of(e.reason)},
-                   {"severity", severities[static_cast<int>(row_of(e.reason).severity)]},
+                   {"severity", name_of(row_of(e.reason).severity)},
                    {"count", e.count},
                    {"value", e.value},
                    {"text", text_of(e)}});

@@ -91,9 +91,8 @@ const Event* standing_warning(const EstimateState& e) {
 }
 
 void add_events(DiagnosticStatus& status, const EstimateState& e) {
-  constexpr const char* severities[] = {"notice", "warning", "error"};
   for (const Event& event : e.events) {
-    add(status, severities[static_cast<int>(row_of(event.reason).severity)],
+    add(status, name_of(row_of(event.reason).severity),
         fmt::format("{}: {:.3f} s, {} times, {}", name_of(event.reason), to_seconds(event.t.time_since_epoch()), event.count,
                     text_of(event)));
   }

@@ -180,6 +180,7 @@ static_assert([] {
   return true;
 }());
 
+constexpr const char* name_of(Severity s) { return std::array{"notice", "warning", "error"}[static_cast<std::size_t>(s)]; }
 constexpr const ReasonRow& row_of(Reason r) { return reasons[static_cast<std::size_t>(r)]; }
 constexpr const char* name_of(Reason r) { return row_of(r).name; }
 constexpr const char* text_of(Reason r) { return row_of(r).text; }
