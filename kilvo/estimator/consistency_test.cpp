@@ -202,8 +202,12 @@ void expect_consistent_with_own_map(Path path) {
   }
   const Share share = share_within(runs, &Nees::pose, 0, 0.4 * 6, 2.0 * 6);
   testing::Test::RecordProperty("pose", std::to_string(share.mean / 6));
-  // Of few runs the mean at one time is a matter of luck more often.
-  EXPECT_GE(share.inside, seeds < 10 ? 0.6 : 0.9) << share.inside << " inside, mean NEES per degree of freedom " << share.mean / 6;
+  EXPECT_GT(share.mean / 6, 0.2);
+  EXPECT_LT(share.mean / 6, 3.0);
+  // Of few runs the mean at one time is a matter of luck.
+  if (seeds >= 10) {
+    EXPECT_GE(share.inside, 0.9) << "mean NEES per degree of freedom " << share.mean / 6;
+  }
 }
 
 TEST(Consistency, WithItsOwnMapTheErrorIsAsLargeAsTheCovarianceSaysOnAStraightPath) { expect_consistent_with_own_map(Path::straight); }

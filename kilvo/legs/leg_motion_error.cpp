@@ -36,9 +36,11 @@ void LegMotionError::add(const State& x, const Eigen::Vector3d& velocity_I, doub
   constexpr double window = 1, longest = 3;                                                           // s
   const Eigen::Vector3d up_W = -x.g.normalized();
   if (alone || !is_known_) {
+    constexpr double least_step2 = 0.005 * 0.005;  // m^2: nothing changes within less
     comparison_.reset();
     if (last_) {
       const Eigen::Vector3d step = x.p - last_->p;
+      if (step.squaredNorm() < least_step2) return;
       turned_ += up_W.dot(last_->R * (last_->R.inverse() * x.R).Log());
       by_legs_ += effect_of(x.R.matrix(), x.R.inverse() * step);
       by_gyro_ += turned_ * up_W.cross(step);

@@ -20,6 +20,7 @@ LegPipeline::LegUpdate LegPipeline::measure(Feet feet, const Estimate& predicted
   if (always_height_) ground = StanceTracker::Ground::use;
   const Eigen::Matrix3d& M = motion_error_.matrix();
   for (FootPose& foot : feet.foot) {
+    if (M.isZero(0)) break;
     for (std::size_t k = 0; k < static_cast<std::size_t>(foot.corners); ++k) {
       foot.p[k] -= M * foot.p[k];
       foot.v[k] -= M * foot.v[k];
