@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <variant>
 
 #include "kilvo/estimator/live_propagator.hpp"
@@ -15,13 +16,13 @@ class RawSamples {
   /// In the order of their arrival.
   void keep(const ImuSample& s) {
     // The time went back: what was before is of another epoch.
-    if (!all_.empty() && newest_imu_ - s.t > longest_step) all_.clear();
+    if (newest_imu_ && *newest_imu_ - s.t > longest_step) all_.clear();
     newest_imu_ = s.t;
     add(s);
   }
   void keep(const Feet& s) {
     // The most of lately: it is smallest just before an IMU sample.
-    const Duration lag = newest_imu_ == Time::min() ? Duration(0) : newest_imu_ - s.t;
+    const Duration lag = newest_imu_ ? *newest_imu_ - s.t : Duration(0);
     lag_ -= lag_ / 4096;
     if (lag < longest_lag) lag_ = std::max(lag_, lag);
     add(s);
@@ -47,7 +48,7 @@ class RawSamples {
   }
 
   Recent<Raw> all_;
-  Time newest_imu_ = Time::min();
+  std::optional<Time> newest_imu_;
   Duration lag_{};  // by which the leg samples' stamps trail the IMU's as they arrive
 };
 
