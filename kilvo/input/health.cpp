@@ -24,7 +24,7 @@ constexpr double legs_same = 0.03;
 constexpr double moving = 0.05;
 constexpr double still_memory = 0.3;  // s
 
-// Of some bytes spread over a block: two clouds or pictures of a noisy sensor never agree in all of them.
+// Of some bytes spread over a block: two pictures of a noisy sensor never agree in all of them.
 std::uint64_t fingerprint(const void* data, std::size_t bytes) {
   const auto* p = static_cast<const unsigned char*>(data);
   std::uint64_t h = 1469598103934665603ULL ^ bytes;
@@ -32,6 +32,12 @@ std::uint64_t fingerprint(const void* data, std::size_t bytes) {
   for (std::size_t i = 0; i < bytes; i += stride) h = (h ^ p[i]) * 1099511628211ULL;
   return h;
 }
+
+// So many points of a sweep, spread over it, are compared with those of the sweep before; so many returns are not the same by chance
+// (ranges in steps of millimetres repeat one in ten of a noisy sensor).
+constexpr std::size_t compared_points = 256, telling_returns = 8;
+
+bool is_return(const Eigen::Vector3f& p) { return p.allFinite() && !p.isZero(0); }
 
 }  // namespace
 
@@ -51,7 +57,23 @@ void Health::time(StreamHealth& stream, Tracker& tracker, Time t) {
   tracker.stamp = t;
 }
 
-bool Health::repeats(const Measurement& m, Tracker& tracker) {
+// A sensor that measures does not return all of its points twice to the last bit; a frozen one does, whatever is missing of them.
+bool Health::repeats(const LidarScan& scan) {
+  const std::size_t stride = std::max<std::size_t>(1, scan.points.size() / compared_points);
+  const bool comparable = std::exchange(cloud_size_, scan.points.size()) == scan.points.size();
+  cloud_.resize((scan.points.size() + stride - 1) / stride, Eigen::Vector3f::Zero());
+  std::size_t returns = 0, equal = 0;
+  for (std::size_t i = 0; i < cloud_.size(); ++i) {
+    const LidarPoint& p = scan.points[i * stride];
+    const Eigen::Vector3f before = std::exchange(cloud_[i], {p.x, p.y, p.z});
+    if (!is_return(before) || !is_return(cloud_[i])) continue;
+    ++returns;
+    equal += before == cloud_[i] ? 1 : 0;
+  }
+  return comparable && returns >= telling_returns && equal == returns;
+}
+
+bool Health::repeats(const Measurement& m) {
   if (const auto* imu = std::get_if<ImuSample>(&m)) return imu->gyro == imu_.gyro && imu->accel == imu_.accel;
   if (const auto* legs = std::get_if<JointSample>(&m)) {
     const bool same = legs->position == position_ && legs->velocity == velocity_;
@@ -59,21 +81,16 @@ bool Health::repeats(const Measurement& m, Tracker& tracker) {
     if (!same) velocity_.assign(legs->velocity.begin(), legs->velocity.end());
     return same;
   }
-  std::uint64_t print = 0;
-  std::uint64_t& last = tracker.stamp && std::holds_alternative<LidarScan>(m) ? cloud_ : picture_;
-  if (const auto* scan = std::get_if<LidarScan>(&m)) {
-    print = fingerprint(scan->points.data(), scan->points.size() * sizeof(LidarPoint));
-  } else {
-    const auto& pixels = std::get<CameraImage>(m).image.pixels;
-    print = fingerprint(pixels.data(), pixels.size());
-  }
-  return std::exchange(last, print) == print;
+  if (const auto* scan = std::get_if<LidarScan>(&m)) return repeats(*scan);
+  const auto& pixels = std::get<CameraImage>(m).image.pixels;
+  const std::uint64_t print = fingerprint(pixels.data(), pixels.size());
+  return std::exchange(picture_, print) == print;
 }
 
 // Repeated values carry nothing new. Of a sensor that never repeats itself they are not used, and enough of them mean that it is frozen.
 std::optional<Reason> Health::judge_repeats(const Measurement& m, StreamHealth& stream, Tracker& tracker) {
   const Time t = stamp_of(m);
-  if (!repeats(m, tracker)) {
+  if (!repeats(m)) {
     tracker.same = 0;
     tracker.frozen = false;
     tracker.different = std::min(alive, tracker.different + 1);

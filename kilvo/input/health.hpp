@@ -54,7 +54,8 @@ class Health {
     std::uint64_t imu_before = 0, before = 0;
   };
   void time(StreamHealth& stream, Tracker& tracker, Time t);
-  bool repeats(const Measurement& m, Tracker& tracker);
+  bool repeats(const Measurement& m);
+  bool repeats(const LidarScan& scan);
   std::optional<Reason> judge_repeats(const Measurement& m, StreamHealth& stream, Tracker& tracker);
   bool is_ahead(Sensor s, Time t, StreamHealth& stream, Tracker& tracker);
   void watch_imu(const Measurement& m);
@@ -64,7 +65,9 @@ class Health {
   std::array<Tracker, sensor_count> trackers_;
   ImuSample imu_;                            // the last
   std::vector<double> position_, velocity_;  // of the last leg message
-  std::uint64_t cloud_ = 0, picture_ = 0;    // fingerprints of the last
+  std::vector<Eigen::Vector3f> cloud_;       // points of the last sweep
+  std::size_t cloud_size_ = 0;               // points that it had in all
+  std::uint64_t picture_ = 0;                // fingerprint of the last image
   double imu_motion_ = 0;                    // rad/s, how much the rate has varied lately
   Eigen::Vector3d gyro_mean_ = Eigen::Vector3d::Zero();
   double imu_silence_ = 0;

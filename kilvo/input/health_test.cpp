@@ -1,6 +1,7 @@
 #include "kilvo/input/health.hpp"
 
 #include <gtest/gtest.h>
+#include <limits>
 #include <random>
 #include <string_view>
 
@@ -56,6 +57,25 @@ TEST(Health, AnImuWithoutNoiseIsNotFrozen) {
     s.t += milliseconds(5);
     EXPECT_EQ(health.judge(s), std::nullopt);
   }
+}
+
+// Of a sensor that repeats itself while points of it are lost on the way, and then no more: no sweep after the first is used.
+TEST(Health, AFrozenLidarIsFrozenWhateverPointsAreMissing) {
+  Health health{Robot{}};
+  LidarScan scan;
+  for (int i = 0; i < 3000; ++i) scan.points.push_back({1.0F + 0.001F * static_cast<float>(i), 2, 1, 10, 0});
+  EXPECT_EQ(health.judge(scan), std::nullopt);
+  for (int n = 1; n < 9; ++n) {
+    LidarScan cut = scan;
+    cut.t += milliseconds(100 * n);
+    for (std::size_t i = 0; i < cut.points.size() && n >= 4; i += 2) cut.points[i].x = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_NE(health.judge(cut), std::nullopt) << n;
+  }
+  EXPECT_TRUE(health.is_frozen(Sensor::lidar));
+  scan.t += milliseconds(1000);
+  for (LidarPoint& p : scan.points) p.x += 0.01F;
+  EXPECT_EQ(health.judge(scan), std::nullopt);
+  EXPECT_FALSE(health.is_frozen(Sensor::lidar));
 }
 
 TEST(Health, LegsThatSayTheSameAreFrozenOnlyWhileTheImuMoves) {
