@@ -60,8 +60,8 @@ test-asan: dependencies
 
 test-tsan: dependencies
 	cmake --preset tsan
-	cmake --build --preset tsan --target kilvo_live_test kilvo_live_walk_test kilvo_math_test
-	ctest --preset tsan -R '^(live|math)'
+	cmake --build --preset tsan --target kilvo_live_test kilvo_live_walk_test kilvo_math_test kilvo_lab_doctor_test
+	ctest --preset tsan -R '^(live|math|lab_doctor/DescriptionWatch)'
 
 bench: configure
 	cmake --build --preset release --target kilvo_bench_micro kilvo_cli
