@@ -193,6 +193,7 @@ void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<
   o->cause = status_.cause();
   if (findings_.has_news()) o->events = findings_.take_events();
   o->contacts = contacts;
+  o->vertical_W = legs_.vertical();
   o->kinematic_us = kinematic_us;
   o->contact_us = contact_us;
   out.push_back(std::move(*o));

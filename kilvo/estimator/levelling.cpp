@@ -15,7 +15,8 @@ constexpr double known = 1e-3;  // well enough, rad
 void Levelling::add(Output& o) {
   if (R_LW_) return;
   last_ = o.t;
-  g_ = o.x.g;
+  g_ = o.vertical_W ? Eigen::Vector3d(-*o.vertical_W) : o.x.g;
+  is_settled_ = o.vertical_W.has_value();
   // Two directions: its length is known.
   const double scale = 1 / std::max(1.0, g_.norm());
   sigma_ = scale * std::sqrt(std::max(0.0, o.P.diagonal().segment<2>(at::g).maxCoeff()));
@@ -24,7 +25,7 @@ void Levelling::add(Output& o) {
     first_ = o.t;
     first_sigma_ = sigma_;
   }
-  if (!(sigma_ < known) && o.t - *first_ <= longest_) return;
+  if (!is_settled_ && !(sigma_ < known) && o.t - *first_ <= longest_) return;
   if (const auto event = finish()) o.events.push_back(*event);
 }
 
@@ -32,7 +33,7 @@ std::optional<Event> Levelling::finish() {
   if (R_LW_ || !first_) return std::nullopt;
   R_LW_ = SO3();
   // Knowing one of two directions is better than none.
-  if (!(least_sigma_ < 0.5 * first_sigma_) || !(g_.z() < 0)) return std::nullopt;
+  if ((!is_settled_ && !(least_sigma_ < 0.5 * first_sigma_)) || !(g_.z() < 0)) return std::nullopt;
   const Eigen::Vector3d up = -g_.normalized();
   R_LW_ = SO3::nearest(Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix());
   return Event{last_, {}, Reason::levelled, R_LW_->Log().norm(), 1, {}};

@@ -30,6 +30,7 @@ class Levelling {
  private:
   Duration longest_;
   std::optional<SO3> R_LW_;
+  bool is_settled_ = false;  // by the ground
   std::optional<Time> first_;
   Time last_{};
   Eigen::Vector3d g_ = Eigen::Vector3d::Zero();

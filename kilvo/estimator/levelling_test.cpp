@@ -70,6 +70,17 @@ TEST(Levelling, WaitsAsLongAsItMay) {
   EXPECT_FALSE(patient.turn());
 }
 
+TEST(Levelling, FollowsTheLegsWhereTheyHaveSettledTheVertical) {
+  Levelling levelling(Duration::max());
+  EXPECT_TRUE(events_of(levelling, 0, 3).empty());
+  Output o = walking(3);
+  o.vertical_W = SO3::Exp(Eigen::Vector3d(0.3 * M_PI / 180, 0, 0)) * Eigen::Vector3d::UnitZ();
+  levelling.add(o);
+  ASSERT_TRUE(levelling.turn());
+  EXPECT_NEAR(levelling.turn()->Log().norm(), 0.3 * M_PI / 180, 1e-9) << "not as gravity seems to be";
+  EXPECT_EQ(o.events.size(), 1u);
+}
+
 TEST(Levelling, TurnsTheGroundUnderTheFeetWithTheWorld) {
   Output o = walking(5);
   const SO3 tilted = o.x.R, level = tilted.inverse();

@@ -92,6 +92,7 @@ Output LivePropagator::output() const {
   o.cause = status_.cause();
   if (with_legs_) {
     o.contacts = legs_.contacts();
+    o.vertical_W = legs_.vertical();
     o.kinematic_us = kinematic_us_;
     o.contact_us = contact_us_;
   }

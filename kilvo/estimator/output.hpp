@@ -33,6 +33,7 @@ struct Output {
   std::uint32_t epoch = 0;  // grows when the time went back and everything began anew: another world, another time
   State x;
   std::optional<SO3> R_LW;                          // the turn that has levelled the world (Levelling::apply); none: as it began
+  std::optional<Eigen::Vector3d> vertical_W;        // settled by the legs (LevelGround): what the world is to be levelled by
   Covariance P = Covariance::Zero();                // of the error relative to the first pose (state.hpp: at)
   Eigen::Vector3d omega = Eigen::Vector3d::Zero();  // bias-free angular rate of the newest IMU sample, in the IMU frame, rad/s
   Modality modality = Modality::coast;

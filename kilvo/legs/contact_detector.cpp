@@ -21,7 +21,7 @@ std::variant<ContactEstimator, PaperContactEstimator, VarianceContacts, ForceCon
 PaperContactEstimator::Residual residual_of(const Stance& foot, const GroundPatch& ground, const State& x, const Eigen::Vector3d& pc,
                                             const Eigen::Vector3d& gyro) {
   PaperContactEstimator::Residual r;
-  r << foot_velocity(x, foot.point, gyro).r, foot_position(x, foot.point, pc).r, foot_height(ground, pc).r;
+  r << foot_velocity(x, foot.point, gyro).r, foot_position(x, foot.point, pc).r, foot_height(ground, x, pc).r;
   return r;
 }
 

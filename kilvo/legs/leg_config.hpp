@@ -46,9 +46,9 @@ struct LegConfig {
               "much)"},
         Field{"height", &LegConfig::height, "-",
               "when the height over the ground counts at touchdown: ki (without LiDAR), always (in every modality), never"},
-        Field{
-            "ground", &LegConfig::ground, "-",
-            "which ground that is: map (of the LiDAR's map, else level with the other foot) or contacts (the plane of the last contacts)"}};
+        Field{"ground", &LegConfig::ground, "-",
+              "which ground that is: map (of the LiDAR's map, else the level floor, else level with the other foot) or contacts (the plane "
+              "of the last contacts)"}};
   }
 };
 

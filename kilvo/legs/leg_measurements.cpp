@@ -15,8 +15,11 @@ FootPositionRow foot_position(const State& x, const SolePoint& point, const Eige
   return {x.p + R * point.p - pc, -R * skew(point.p), Eigen::Matrix3d::Identity(), -Eigen::Matrix3d::Identity()};
 }
 
-FootHeightRow foot_height(const GroundPatch& ground, const Eigen::Vector3d& pc) {
-  return {ground.height_of(pc), ground.normal.transpose()};
+FootHeightRow foot_height(const GroundPatch& ground, const State& x, const Eigen::Vector3d& pc) {
+  if (!ground.is_level) return {ground.height_of(pc), ground.normal.transpose()};
+  const Eigen::Vector3d up = -x.g.normalized(), d = pc - ground.point;
+  const double height = up.dot(d);
+  return {height, up.transpose(), (height * up - d).transpose() / x.g.norm()};
 }
 
 // Velocity and position of one foot as rows `count` to `count` + 5.
@@ -68,17 +71,18 @@ bool LegModel::add_height(LegRows& rows, int count, std::size_t side, const Stat
   const auto& level = step_.foot[side].level;
   if (!ground && !level) return false;
   const int pc = at::pcl + 3 * static_cast<int>(side), other = at::pcl + 3 * (1 - static_cast<int>(side));
-  FootHeightRow h =
-      ground ? foot_height(*ground, x.pc[side]) : FootHeightRow{level->normal.dot(x.pc[side] - x.pc[1 - side]), level->normal.transpose()};
+  FootHeightRow h = ground ? foot_height(*ground, x, x.pc[side])
+                           : FootHeightRow{level->normal.dot(x.pc[side] - x.pc[1 - side]), level->normal.transpose()};
   const double scale = step_.foot[side].row_scale ? (*step_.foot[side].row_scale)[6] : 1.0;
-  const double variance =
-      ground ? scale * (ground->sigma * ground->sigma + config_.ground_sigma * config_.ground_sigma) : level->sigma * level->sigma;
+  const double variance = ground ? scale * ground->sigma * ground->sigma : level->sigma * level->sigma;
   Eigen::Matrix3d S = prior.block<3, 3>(pc, pc);
   if (!ground) S += prior.block<3, 3>(other, other) - prior.block<3, 3>(pc, other) - prior.block<3, 3>(other, pc);
-  const double spread = h.J_pc * S * h.J_pc.transpose();
+  const double spread =
+      h.J_pc * S * h.J_pc.transpose() + (2 * h.J_pc * prior.block<3, 3>(pc, at::g) + h.J_g * prior.block<3, 3>(at::g, at::g)).dot(h.J_g);
   const double gate = ground ? config_.gate : 3;
   if (h.r * h.r > gate * gate * (spread + variance)) return false;
   rows.H.block<1, 3>(count, pc) = h.J_pc;
+  rows.H.block<1, 3>(count, at::g) = h.J_g;
   if (!ground) rows.H.block<1, 3>(count, other) = -h.J_pc;
   rows.r[count] = h.r;
   rows.R(count, count) = variance;
@@ -115,7 +119,7 @@ Residual<LegModel::max_leg_rows> LegModel::residual(const LegStep& step, const S
     r.segment<3>(count + 3) = foot_position(x, foot.point, x.pc[side]).r;
     count += 6;
     if (!used.height[side]) continue;
-    r[count++] = foot.ground ? foot_height(*foot.ground, x.pc[side]).r : foot.level->normal.dot(x.pc[side] - x.pc[1 - side]);
+    r[count++] = foot.ground ? foot_height(*foot.ground, x, x.pc[side]).r : foot.level->normal.dot(x.pc[side] - x.pc[1 - side]);
   }
   r.conservativeResize(count);
   return r;

@@ -55,12 +55,12 @@ struct FootPositionRow {
 };
 FootPositionRow foot_position(const State& x, const SolePoint& point, const Eigen::Vector3d& pc);
 
-/// r = n'(p_c - q), the height of the contact point over the ground (Eq. 6); J over p_c.
+/// r = n'(p_c - q), the height of the contact point over the ground (Eq. 6); J over p_c, and over g where the normal is the vertical.
 struct FootHeightRow {
   double r;
-  Eigen::RowVector3d J_pc;
+  Eigen::RowVector3d J_pc, J_g = Eigen::RowVector3d::Zero();
 };
-FootHeightRow foot_height(const GroundPatch& ground, const Eigen::Vector3d& pc);
+FootHeightRow foot_height(const GroundPatch& ground, const State& x, const Eigen::Vector3d& pc);
 
 /// The model that `update` calls: velocity and position of each standing foot that passes the gate, and at touchdown its height.
 class LegModel {

@@ -34,7 +34,9 @@ LegPipeline::LegUpdate LegPipeline::measure(Feet feet, const Estimate& predicted
   contacts_.update(feet, x, omega, imu.accel - x.ba, sigma_v, map);
   out.contact_us = watch.lap_us();
   stances_.set_on_legs_alone(on_legs_alone);
+  for (std::size_t side = 0; side < 2; ++side) level_ground_.stands_at(side, x.pc[side]);
   out.step = stances_.step(feet, contacts_.contacts(), x, omega, sigma_v, map, ground);
+  if (has_level_ground_) find_level_ground(out.step, predicted, ground);
   contacts_.adapt(out.step, x, imu.gyro, ground);
   // As the filter sees it: the standing feet by their weights.
   Eigen::Vector3d velocity_I = Eigen::Vector3d::Zero();
@@ -45,6 +47,26 @@ LegPipeline::LegUpdate LegPipeline::measure(Feet feet, const Estimate& predicted
     velocity_I -= (omega.cross(foot.point.p) + foot.point.v) / foot.variance_scale;
   }
   motion_error_.add(x, velocity_I / std::max(weight, 1e-9), weight, out.step.dt, on_legs_alone);
+  return out;
+}
+
+// Where the map has no ground under a foot that comes down.
+void LegPipeline::find_level_ground(LegStep& step, const Estimate& predicted, StanceTracker::Ground ground) {
+  if (ground == StanceTracker::Ground::learn) return level_ground_.height_is_measured();
+  for (std::size_t side = 0; side < 2; ++side) {
+    Stance& foot = step.foot[side];
+    if (!foot.begins) continue;
+    const auto level = level_ground_.touchdown(side, predicted.x.pose() * foot.point.p, predicted);
+    if (!level || foot.ground) continue;
+    foot.ground = level;
+    foot.level.reset();
+  }
+}
+
+PoseCovariance LegPipeline::description_error(const State& x) const {
+  PoseCovariance out = motion_error_.error(x);
+  const Eigen::Vector3d up_W = -x.g.normalized();
+  out.bottomRightCorner<3, 3>() += level_ground_.doubt2() * up_W * up_W.transpose();
   return out;
 }
 
@@ -63,6 +85,7 @@ bool LegPipeline::has_stood_lately(Time t) const { return t - last_used_stance_ 
 void LegPipeline::restart() {
   contacts_.restart();
   stances_.restart();
+  level_ground_.restart();
 }
 
 }  // namespace kilvo

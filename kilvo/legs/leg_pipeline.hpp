@@ -7,6 +7,7 @@
 #include "kilvo/filter/state.hpp"
 #include "kilvo/legs/contact_detector.hpp"
 #include "kilvo/legs/leg_motion_error.hpp"
+#include "kilvo/legs/level_ground.hpp"
 #include "kilvo/legs/stance_tracker.hpp"
 
 namespace kilvo {
@@ -14,7 +15,11 @@ namespace kilvo {
 class LegPipeline {
  public:
   /// Throws std::invalid_argument when config.contact names no detector.
-  explicit LegPipeline(const LegConfig& config) : contacts_(config), stances_(config), always_height_(config.height == "always") {}
+  explicit LegPipeline(const LegConfig& config)
+      : contacts_(config),
+        stances_(config),
+        always_height_(config.height == "always"),
+        has_level_ground_(config.height != "never" && config.ground != "contacts") {}
 
   /// What the feet say of `predicted`, the estimate of their time, and what that took. `imu`: of the feet's time. `map`: on whose planes
   /// the feet stand, if any. Allocates nothing.
@@ -44,15 +49,21 @@ class LegPipeline {
   /// Something else has measured the pose, see LegMotionError.
   void pose_is_measured(const Eigen::Matrix3d& unknown) { motion_error_.pose_is_measured(unknown); }
   /// By how much the pose of `x` may be off because the robot is not quite as described.
-  PoseCovariance description_error(const State& x) const { return motion_error_.error(x); }
+  PoseCovariance description_error(const State& x) const;
+
+  /// See LevelGround.
+  const std::optional<Eigen::Vector3d>& vertical() const { return level_ground_.vertical(); }
 
   /// After a gap in the legs' messages, or of the estimate: nothing of before is known to be true.
   void restart();
 
  private:
+  void find_level_ground(LegStep& step, const Estimate& predicted, StanceTracker::Ground ground);
+
   ContactDetector contacts_;
   StanceTracker stances_;
-  bool always_height_;
+  LevelGround level_ground_;
+  bool always_height_, has_level_ground_;
   Time last_used_stance_{};  // when a foot was used last
   Time last_stance_{};       // the same, or since when that is waited for
   double leg_length_ = 1;    // m

@@ -102,7 +102,7 @@ std::optional<GroundPatch> StanceTracker::ground_under(const VoxelMap& map, cons
     return std::nullopt;
   }
   patch->point += sink_ * patch->normal;
-  patch->sigma = std::sqrt(patch->sigma * patch->sigma + sink_variance_);
+  patch->sigma = std::sqrt(patch->sigma * patch->sigma + sink_variance_ + config_.ground_sigma * config_.ground_sigma);
   return patch;
 }
 
@@ -142,6 +142,7 @@ void StanceTracker::add_ground(std::size_t side, Stance& foot, const State& x, c
   const Eigen::Vector3d p_W = x.pose() * foot.point.p, up_W = -x.g.normalized();
   if (by_contacts_) {
     if (ground == Ground::use) foot.ground = places_.of_contacts(up_W);
+    if (foot.ground) foot.ground->sigma = std::hypot(foot.ground->sigma, config_.ground_sigma);
     places_.stands_at(p_W);
     return;
   }
