@@ -22,7 +22,7 @@ constexpr double least_noise = 0.01;
 // What is higher or lower than that is another floor, m.
 constexpr double same_floor = 0.03;
 // The vertical is settled when gravity is known as well as this (rad), or after so long: when the world is levelled (Levelling).
-constexpr double known = 1e-3;
+constexpr double known_vertical = 1e-3;
 constexpr Duration longest_search = std::chrono::seconds(19);
 
 }  // namespace
@@ -115,7 +115,7 @@ void LevelGround::learn(const Eigen::Vector3d& step_W, const SO3& R) {
 void LevelGround::find_vertical(const Estimate& e) {
   if (vertical_W_) return;
   up_W_ = -e.x.g.normalized();
-  const bool is_known = e.P.diagonal().segment<2>(at::g).maxCoeff() < known * known * e.x.g.squaredNorm();
+  const bool is_known = e.P.diagonal().segment<2>(at::g).maxCoeff() < known_vertical * known_vertical * e.x.g.squaredNorm();
   if (is_known || (is_level_ && e.t - *first_ > longest_search)) vertical_W_ = up_W_;
 }
 
