@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kilvo/legs/level_ground.hpp"
 #include "kilvo/math/decompositions.hpp"
 
 namespace kilvo {
 namespace {
 
-constexpr double known = 1e-3;  // well enough, rad
+constexpr double known = LevelGround::known_vertical;
 
 }  // namespace
 
@@ -48,6 +49,7 @@ void Levelling::apply(const SO3& R_LW, Output& o) {
     o.P.middleRows<3>(block) = (R * o.P.middleRows<3>(block)).eval();
     o.P.middleCols<3>(block) = (o.P.middleCols<3>(block) * R.transpose()).eval();
   }
+  if (o.vertical_W) o.vertical_W = R * *o.vertical_W;
   if (o.contacts) {
     for (Eigen::Vector3d* v : {&o.contacts->normal, &o.contacts->ground[0].normal, &o.contacts->ground[0].point,
                                &o.contacts->ground[1].normal, &o.contacts->ground[1].point})

@@ -90,9 +90,9 @@ Output LivePropagator::output() const {
   o.omega = history_.replay().newest_imu().gyro - e.x.bg;
   o.modality = status_.modality();
   o.cause = status_.cause();
+  o.vertical_W = legs_.vertical();
   if (with_legs_) {
     o.contacts = legs_.contacts();
-    o.vertical_W = legs_.vertical();
     o.kinematic_us = kinematic_us_;
     o.contact_us = contact_us_;
   }

@@ -57,9 +57,9 @@ void Health::time(StreamHealth& stream, Tracker& tracker, Time t) {
   tracker.stamp = t;
 }
 
-// A sensor that measures does not return all of its points twice to the last bit; a frozen one does, whatever is missing of them.
+// A sensor that measures does not return all of its points twice to the last bit; a frozen one does, whichever of them are blank (NaN, 0).
 bool Health::repeats(const LidarScan& scan) {
-  const std::size_t stride = std::max<std::size_t>(1, scan.points.size() / compared_points);
+  const std::size_t stride = std::max<std::size_t>(1, scan.points.size() / compared_points) | 1;
   const bool comparable = std::exchange(cloud_size_, scan.points.size()) == scan.points.size();
   cloud_.resize((scan.points.size() + stride - 1) / stride, Eigen::Vector3f::Zero());
   std::size_t returns = 0, equal = 0;

@@ -60,7 +60,7 @@ TEST(Health, AnImuWithoutNoiseIsNotFrozen) {
 }
 
 // Of a sensor that repeats itself while points of it are lost on the way, and then no more: no sweep after the first is used.
-TEST(Health, AFrozenLidarIsFrozenWhateverPointsAreMissing) {
+TEST(Health, AFrozenLidarIsFrozenWhicheverPointsAreBlank) {
   Health health{Robot{}};
   LidarScan scan;
   for (int i = 0; i < 3000; ++i) scan.points.push_back({1.0F + 0.001F * static_cast<float>(i), 2, 1, 10, 0});

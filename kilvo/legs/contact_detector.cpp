@@ -27,7 +27,7 @@ PaperContactEstimator::Residual residual_of(const Stance& foot, const GroundPatc
 
 }  // namespace
 
-ContactDetector::ContactDetector(const LegConfig& config) : detector_(make(config)) {}
+ContactDetector::ContactDetector(const LegConfig& config) : detector_(make(config)), ground_sigma_(config.ground_sigma) {}
 
 const Contacts& ContactDetector::update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel,
                                         double sigma_v, const VoxelMap* map) {
@@ -57,11 +57,11 @@ void ContactDetector::adapt(LegStep& step, const State& x, const Eigen::Vector3d
     paper->learn(side, r);
     foot.row_scale = paper->row_scale(r);
     foot.variance_scale = 1;
-    // Without a map the ground is that of the earlier contacts (KI).
+    // Without a map, and where it is not known to be level, the ground is that of the earlier contacts (KI).
     const auto& patch = paper->contact_patch(side);
     if (!foot.begins || foot.ground || !patch || ground != StanceTracker::Ground::use) continue;
     foot.ground = patch;
-    foot.ground->sigma = std::max(patch->sigma, contact_patch_sigma);
+    foot.ground->sigma = std::hypot(std::max(patch->sigma, contact_patch_sigma), ground_sigma_);
   }
 }
 

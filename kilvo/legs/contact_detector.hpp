@@ -29,6 +29,7 @@ class ContactDetector {
 
  private:
   std::variant<ContactEstimator, PaperContactEstimator, VarianceContacts, ForceContacts> detector_;
+  double ground_sigma_;  // m
 };
 
 }  // namespace kilvo

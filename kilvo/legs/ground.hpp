@@ -1,4 +1,4 @@
-// The ground under a foot: from the map where it has a plane there, otherwise from where the feet stood last.
+// The ground under a foot: from the map where it has a plane there, otherwise from where the feet stood (LevelGround, GroundLookup).
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,7 @@ struct GroundPatch {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // upwards
   Eigen::Vector3d point = Eigen::Vector3d::Zero();    // m
   double sigma = 0;                                   // of its height along the normal, roughness included, m
-  bool is_level = false;                              // its normal is the vertical, whatever that turns out to be
+  bool measures_gravity = false;                      // level, so that its normal is the vertical, as the state has it then
 
   /// Over the patch, along its normal, m.
   double height_of(const Eigen::Vector3d& p_W) const { return normal.dot(p_W - point); }

@@ -16,7 +16,7 @@ FootPositionRow foot_position(const State& x, const SolePoint& point, const Eige
 }
 
 FootHeightRow foot_height(const GroundPatch& ground, const State& x, const Eigen::Vector3d& pc) {
-  if (!ground.is_level) return {ground.height_of(pc), ground.normal.transpose()};
+  if (!ground.measures_gravity) return {ground.height_of(pc), ground.normal.transpose()};
   const Eigen::Vector3d up = -x.g.normalized(), d = pc - ground.point;
   const double height = up.dot(d);
   return {height, up.transpose(), (height * up - d).transpose() / x.g.norm()};

@@ -195,10 +195,10 @@ TEST(LegMeasurements, TheJacobianOfTheHeightIsWhatCentralDifferencesSay) {
   test::Random random(12);
   for (int i = 0; i < 20; ++i) {
     const State x = test::random_state(random);
-    const bool is_level = i % 2 == 1;
-    const GroundPatch ground{random.vector3(1).normalized(), random.vector3(2), 0.01, is_level};
+    const bool measures_gravity = i % 2 == 1;
+    const GroundPatch ground{random.vector3(1).normalized(), random.vector3(2), 0.01, measures_gravity};
     const FootHeightRow row = foot_height(ground, x, x.pc[0]);
-    EXPECT_NEAR(row.r, (is_level ? Eigen::Vector3d(-x.g.normalized()) : ground.normal).dot(x.pc[0] - ground.point), 1e-12);
+    EXPECT_NEAR(row.r, (measures_gravity ? Eigen::Vector3d(-x.g.normalized()) : ground.normal).dot(x.pc[0] - ground.point), 1e-12);
     Eigen::Matrix<double, 1, at::size> J = Eigen::Matrix<double, 1, at::size>::Zero();
     J.middleCols<3>(at::pcl) = row.J_pc;
     J.middleCols<3>(at::g) = row.J_g;

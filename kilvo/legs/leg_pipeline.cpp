@@ -52,7 +52,7 @@ LegPipeline::LegUpdate LegPipeline::measure(Feet feet, const Estimate& predicted
 
 // Where the map has no ground under a foot that comes down.
 void LegPipeline::find_level_ground(LegStep& step, const Estimate& predicted, StanceTracker::Ground ground) {
-  if (ground == StanceTracker::Ground::learn) return level_ground_.height_is_measured();
+  if (ground == StanceTracker::Ground::learn) return level_ground_.restart();
   for (std::size_t side = 0; side < 2; ++side) {
     Stance& foot = step.foot[side];
     if (!foot.begins) continue;
@@ -63,10 +63,16 @@ void LegPipeline::find_level_ground(LegStep& step, const Estimate& predicted, St
   }
 }
 
+void LegPipeline::pose_is_measured(const Eigen::Matrix3d& unknown) {
+  motion_error_.pose_is_measured(unknown);
+  constexpr double mostly = 0.5;
+  if (unknown(2, 2) < mostly) level_ground_.height_is_measured();
+}
+
 PoseCovariance LegPipeline::description_error(const State& x) const {
   PoseCovariance out = motion_error_.error(x);
   const Eigen::Vector3d up_W = -x.g.normalized();
-  out.bottomRightCorner<3, 3>() += level_ground_.doubt2() * up_W * up_W.transpose();
+  out.bottomRightCorner<3, 3>() += level_ground_.stair_variance() * up_W * up_W.transpose();
   return out;
 }
 

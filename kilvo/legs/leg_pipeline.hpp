@@ -47,8 +47,8 @@ class LegPipeline {
 
   const Contacts& contacts() const { return contacts_.contacts(); }
   /// Something else has measured the pose, see LegMotionError.
-  void pose_is_measured(const Eigen::Matrix3d& unknown) { motion_error_.pose_is_measured(unknown); }
-  /// By how much the pose of `x` may be off because the robot is not quite as described.
+  void pose_is_measured(const Eigen::Matrix3d& unknown);
+  /// By how much the pose of `x` may be off because the robot is not quite as described, or a stair was none.
   PoseCovariance description_error(const State& x) const;
 
   /// See LevelGround.

@@ -14,16 +14,17 @@ constexpr double length_of_ground = 15, bend = 0.01;
 // A kerb or a stair: so likely at a step, and anywhere within so many metres.
 constexpr double stair_probability = 0.01, stair_range = 0.4;
 // One standard deviation of what is wrong about its height.
-constexpr double doubted_share = 0.5;
+constexpr double wrong_share = 0.5;
 // As level as this ground is used, and no longer when less than this.
 constexpr double surely_level = 0.95, hardly_level = 0.5;
-// Floors are not more even than this, m.
-constexpr double least_noise = 0.01;
+// Floors are not more even than this; nor is a step measured better than this, m.
+constexpr double least_noise = 0.01, least_step_noise = 0.001;
 // What is higher or lower than that is another floor, m.
 constexpr double same_floor = 0.03;
-// The vertical is settled when gravity is known as well as this (rad), or after so long: when the world is levelled (Levelling).
-constexpr double known_vertical = 1e-3;
-constexpr Duration longest_search = std::chrono::seconds(19);
+// Walking on level ground shows the vertical within so long. The first two feet that come down are those on which the robot stands.
+constexpr Duration longest_search = std::chrono::seconds(14);
+constexpr std::size_t touchdowns_of_a_walk = 3;
+constexpr double least_probability = 1e-6;
 
 }  // namespace
 
@@ -44,10 +45,7 @@ void LevelGround::restart() {
   is_level_ = false;
 }
 
-void LevelGround::height_is_measured() {
-  restart();
-  doubt2_ = 0;
-}
+double LevelGround::step_variance() const { return std::max(least_step_noise * least_step_noise, noise_.variance()); }
 
 // One Gaussian for two.
 LevelGround::Hypothesis LevelGround::mix(const Hypothesis& a, const Hypothesis& b) {
@@ -90,14 +88,14 @@ void LevelGround::learn(const Eigen::Vector3d& step_W, const SO3& R) {
   double likelihood = 0, expected = 0;
   std::array<double, 2> of{};
   for (std::size_t i = 0; i < 2; ++i) {
-    const double mean = H.dot(both[i]->mean), S = H.dot(both[i]->P * H) + noise_.variance();
+    const double mean = H.dot(both[i]->mean), S = H.dot(both[i]->P * H) + step_variance();
     of[i] = both[i]->probability * std::exp(-0.5 * (h - mean) * (h - mean) / S) / std::sqrt(2 * M_PI * S);
     likelihood += of[i];
     expected += of[i] * mean;
   }
-  if (likelihood < stair_probability / stair_range) {
+  if (!(likelihood >= stair_probability / stair_range)) {
     is_level_ = false;
-    doubt2_ += doubted_share * doubted_share * h * h;
+    stair_variance_ += wrong_share * wrong_share * h * h;
     level_.probability = usually_level;
     sloped_.probability = 1 - usually_level;
     return;
@@ -105,10 +103,10 @@ void LevelGround::learn(const Eigen::Vector3d& step_W, const SO3& R) {
   noise_.add(h - expected / likelihood, 1);
   for (std::size_t i = 0; i < 2; ++i) {
     const Vector PH = both[i]->P * H;
-    const double S = H.dot(PH) + noise_.variance();
+    const double S = H.dot(PH) + step_variance();
     both[i]->mean += PH * ((h - H.dot(both[i]->mean)) / S);
     both[i]->P -= PH * PH.transpose() / S;
-    both[i]->probability = of[i] / likelihood;
+    both[i]->probability = std::clamp(of[i] / likelihood, least_probability, 1 - least_probability);
   }
 }
 
@@ -116,7 +114,7 @@ void LevelGround::find_vertical(const Estimate& e) {
   if (vertical_W_) return;
   up_W_ = -e.x.g.normalized();
   const bool is_known = e.P.diagonal().segment<2>(at::g).maxCoeff() < known_vertical * known_vertical * e.x.g.squaredNorm();
-  if (is_known || (is_level_ && e.t - *first_ > longest_search)) vertical_W_ = up_W_;
+  if (is_known || (is_level_ && first_ && e.t - *first_ > longest_search)) vertical_W_ = up_W_;
 }
 
 void LevelGround::stands_at(std::size_t side, const Eigen::Vector3d& pc_W) {
@@ -127,7 +125,7 @@ void LevelGround::stands_at(std::size_t side, const Eigen::Vector3d& pc_W) {
 
 std::optional<GroundPatch> LevelGround::touchdown(std::size_t side, const Eigen::Vector3d& p_W, const Estimate& e) {
   if (!p_W.allFinite() || !e.x.R.matrix().allFinite() || !(e.x.g.norm() > 0)) return std::nullopt;  // a state that is thrown away
-  if (!first_) first_ = e.t;
+  if (++touchdowns_ == touchdowns_of_a_walk) first_ = e.t;
   if (last_) learn(p_W - *last_, e.x.R);
   find_vertical(e);
   is_level_ = level_.probability > (is_level_ ? hardly_level : surely_level);
@@ -140,7 +138,7 @@ std::optional<GroundPatch> LevelGround::touchdown(std::size_t side, const Eigen:
   // What the legs climb too much may not be taken for a tilt of the world.
   const Eigen::Vector3d d = e.x.R.inverse() * (p_W - *floor_);
   const double climb2 = vertical_W_ ? 0 : d.dot(level_.P.topLeftCorner<3, 3>() * d);
-  return GroundPatch{up_W_, *floor_, std::sqrt(std::max(least_noise * least_noise, noise_.variance()) + climb2), !vertical_W_};
+  return GroundPatch{up_W_, *floor_, std::sqrt(std::max(least_noise * least_noise, step_variance()) + climb2), !vertical_W_};
 }
 
 }  // namespace kilvo

@@ -4,9 +4,9 @@
 // of the step in its own frame, whichever way it goes. A slope stays where it is in the world while the robot turns. The height of a step d
 // is
 //   h = m'd_I + s'd_W + noise
-// where m is what the legs climb too much, and s the slope of the ground, if it has one. Two hypotheses, level and sloped, each with a
-// Kalman filter of (m, s), mixed as interacting models are (Blom and Bar-Shalom 1988). Floors are level more often than not, and
-// descriptions are off by no more than a degree or so: these priors decide while the robot walks straight on.
+// where m (m/m, IMU frame) is what the legs climb too much, and s (m/m, world frame) the slope of the ground. Two hypotheses, level and
+// sloped, each with a Kalman filter of (m, s), mixed as interacting models are (Blom and Bar-Shalom 1988). Floors are level more often than
+// not, and descriptions are off by no more than a degree or so: these priors decide while the robot walks straight on.
 //
 // On level ground the footholds tell the filter where up is, too, until the world has been levelled (Levelling).
 #pragma once
@@ -25,18 +25,21 @@ class LevelGround {
  public:
   LevelGround();
 
-  /// Where the foot that came down last stands, as the filter knows it by now, m.
+  /// Gravity's direction is known well enough to level a world by it, rad (one standard deviation of either axis).
+  static constexpr double known_vertical = 1e-3;
+
+  /// Where the foot that came down last stands by now, m, world frame. `side`: 0 left, 1 right.
   void stands_at(std::size_t side, const Eigen::Vector3d& pc_W);
-  /// A foot comes down at p_W: the ground there when that is very likely level.
+  /// A foot comes down at p_W (m, world frame): the ground there when that is very likely level, else nothing. `e`: the estimate then.
   std::optional<GroundPatch> touchdown(std::size_t side, const Eigen::Vector3d& p_W, const Estimate& e);
-  /// By how much the height may be off because a stair was none, but a push that the IMU has not measured: variance, m^2.
-  double doubt2() const { return doubt2_; }
+  /// Variance of the height, m^2, for steps that were taken for stairs but may have been motion that the IMU has not measured.
+  double stair_variance() const { return stair_variance_; }
   /// The feet are no longer where they stood.
   void restart();
-  /// Something else measures the height.
-  void height_is_measured();
+  /// Something else has measured the height.
+  void height_is_measured() { stair_variance_ = 0; }
 
-  /// The vertical, once it has been settled for good: what the world may be levelled by.
+  /// The vertical once it has been settled for good, by which the world may be levelled: unit vector, upwards, world frame.
   const std::optional<Eigen::Vector3d>& vertical() const { return vertical_W_; }
 
  private:
@@ -49,17 +52,19 @@ class LevelGround {
   };
   static Hypothesis mix(const Hypothesis& a, const Hypothesis& b);
   void predict(double way);
+  double step_variance() const;
   void learn(const Eigen::Vector3d& step_W, const SO3& R);
   void find_vertical(const Estimate& e);
 
   Hypothesis level_, sloped_;
-  RunningStatistics noise_;                          // of the height of a step, m
-  std::optional<Time> first_;                        // step
+  RunningStatistics noise_;  // of the height of a step, m
+  std::size_t touchdowns_ = 0;
+  std::optional<Time> first_;                        // step of the walk
   Eigen::Vector3d up_W_ = Eigen::Vector3d::UnitZ();  // as it is known by now
   std::optional<Eigen::Vector3d> vertical_W_;
   std::optional<Eigen::Vector3d> last_;  // foothold
   std::optional<std::size_t> has_come_down_;
-  double doubt2_ = 0;
+  double stair_variance_ = 0;
   bool is_level_ = false;
   std::optional<Eigen::Vector3d> floor_;  // a foothold on the level ground that was walked on last
 };

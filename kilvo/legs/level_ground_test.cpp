@@ -86,16 +86,16 @@ TEST(LevelGround, AStairLeadsToAnotherFloor) {
   EXPECT_NEAR(above->point.z() - below->point.z(), 0.15, 0.015);
 }
 
-// Until the vertical is settled the ground tells of gravity, too; the world is levelled by what it is after 19 s at the latest.
+// Until the vertical is settled the ground tells of gravity, too; the world is levelled by what it is after 14 s of walking at the latest.
 TEST(LevelGround, SettlesTheVerticalWhenGravityIsKnownOrAfterAWhile) {
   Walk known, unknown;
   known.walk(10);
   EXPECT_TRUE(known.ground.vertical());
-  EXPECT_FALSE(known.walk(1)->is_level);
+  EXPECT_FALSE(known.walk(1)->measures_gravity);
   unknown.tilt_sigma = 0.005;
-  EXPECT_TRUE(unknown.walk(40)->is_level);
-  EXPECT_FALSE(unknown.ground.vertical()) << "16 s";
-  EXPECT_FALSE(unknown.walk(10)->is_level);
+  EXPECT_TRUE(unknown.walk(30)->measures_gravity);
+  EXPECT_FALSE(unknown.ground.vertical()) << "12 s";
+  EXPECT_FALSE(unknown.walk(10)->measures_gravity);
   EXPECT_TRUE(unknown.ground.vertical());
 }
 

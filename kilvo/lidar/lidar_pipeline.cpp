@@ -86,7 +86,7 @@ Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estim
     out.carries = true;
   } else {
     const UndistortionNoise within_scan = undistortion_noise(noise_, end - prior.t);
-    out.searched = needs_search(prior.P, PoseCovariance::Identity() - unobservable_);
+    out.searched = needs_search(prior.P, PoseCovariance::Identity() - unknowable_);
     if (out.searched) {
       search(map, prior, model, within_scan, out);
     } else {
@@ -143,6 +143,10 @@ void LidarPipeline::search(const VoxelMap& map, const Estimate& prior, LidarMode
 
 void LidarPipeline::accept(const Registration& sweep) {
   unobservable_ = sweep.carries ? weak_part(sweep.report.degeneracy) : PoseCovariance::Identity();
+  if (!sweep.searched) searched_since_.reset();
+  if (sweep.searched && !searched_since_) searched_since_ = sweep.posterior.t;
+  // What a sweep does not hold that had to be found may be for its smear: it is searched for again, for a while.
+  if (!searched_since_ || sweep.posterior.t - *searched_since_ > longest_refusal) unknowable_ = unobservable_;
   refused_since_.reset();
 }
 
@@ -177,7 +181,7 @@ bool LidarPipeline::refuse(Time t, bool map_is_given) {
   if (!refused_since_) refused_since_ = t;
   rejoin();
   if (map_is_given || t - *refused_since_ < longest_refusal) return false;
-  unobservable_.setZero();
+  unobservable_ = unknowable_ = PoseCovariance::Zero();
   refused_since_.reset();
   sweeps_to_go_ = 0;
   return true;

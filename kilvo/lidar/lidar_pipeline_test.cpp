@@ -209,5 +209,27 @@ TEST(LidarPipeline, AfterFourPeriodsOfSilenceTheMapIsJoinedAgain) {
   EXPECT_TRUE(pipeline.is_rejoining());
 }
 
+// A sweep without a shape hides directions that the world shows: what it left open is searched for by the next ones. After two seconds it
+// is taken for the world's.
+TEST(LidarPipeline, WhatAFoundSweepDoesNotHoldIsSearchedForAgainForTwoSeconds) {
+  Standing s;
+  const VoxelMap whole = s.whole();
+  const Eigen::Vector3d along = s.room.surfaces()[1].u.normalized();
+  Estimate prior = s.prior(0.3 * along, 0.001);
+  prior.P.block<3, 3>(at::p, at::p) += 0.25 * along * along.transpose();
+  Registration open = s.measured(whole, prior);
+  ASSERT_TRUE(open.searched);
+  open.report.degeneracy = s.measured(test::exact_map({s.room.surfaces()[1]}, SE3()), s.prior({0, 0, 0}, 0.01)).report.degeneracy;
+  ASSERT_EQ(open.report.degeneracy.weak_count, 3);
+  for (int tenth = 0; tenth <= 20; ++tenth) {
+    s.pipeline.accept(open);
+    EXPECT_TRUE(s.pipeline.is_blind_somewhere());
+    EXPECT_TRUE(s.measured(whole, prior).searched) << tenth;
+    open.posterior.t += milliseconds(100);
+  }
+  s.pipeline.accept(open);
+  EXPECT_FALSE(s.measured(whole, prior).searched);
+}
+
 }  // namespace
 }  // namespace kilvo

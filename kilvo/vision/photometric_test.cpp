@@ -4,7 +4,7 @@
 
 #include "kilvo/filter/update.hpp"
 #include "kilvo/vision/new_points.hpp"
-#include "kilvo/vision/tiny_scene.hpp"
+#include "tests/helpers/tiny_scene.hpp"
 
 namespace kilvo {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "kilvo/vision/tiny_scene.hpp"
+#include "tests/helpers/tiny_scene.hpp"
 
 namespace kilvo {
 namespace {
