@@ -37,7 +37,7 @@ struct LegStep {
   double velocity_sigma = 0, vertical_velocity_sigma = 0;  // of a standing sole along each horizontal axis and the vertical, m/s
   std::array<Stance, 2> foot;
   std::optional<GyroBiasReading> gyro_bias;
-  std::optional<double> rise;  // by which the state's vertical velocity is wrong, as the soles show it, m/s
+  std::optional<double> rise;  // by which the state's vertical velocity may be more wrong than it reports, as the soles show it, m/s
 };
 
 /// r = v + R (omega x p + v_fk), the velocity of the contact point in the world (Eq. 5, first row); J over (R, p, v, bg).

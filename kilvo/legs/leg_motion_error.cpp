@@ -10,6 +10,8 @@ namespace {
 // Standard deviations that a careful description leaves, of each element of M: of what is alike for as long as the robot is the same, and
 // of what differs from one ground and gait to the next. Of the scale of the gyro, by data sheets.
 constexpr double lasting = 0.0087, varying = 0.005, gyro_scale = 0.003;
+// Of the bias of a gyro that warms up, rad/s^2: 0.004 rad/s within minutes.
+constexpr double gyro_drift = 2e-5;
 // A load lasts for about so long, s.
 constexpr double memory = 300;
 
@@ -27,7 +29,8 @@ LegMotionError::LegMotionError() : P_(lasting * lasting * Eigen::Matrix<double, 
 void LegMotionError::pose_is_measured(const Eigen::Matrix3d& unknown) {
   by_legs_ = unknown * by_legs_;
   by_gyro_ = unknown * by_gyro_;
-  turned_ = 0;
+  by_drift_ = unknown * by_drift_;
+  turned_ = alone_for_ = 0;
   measured_ = is_known_ = unknown.isZero(0);
 }
 
@@ -38,12 +41,14 @@ void LegMotionError::add(const State& x, const Eigen::Vector3d& velocity_I, doub
   if (alone || !is_known_) {
     constexpr double least_step2 = 0.005 * 0.005;  // m^2: nothing changes within less
     comparison_.reset();
+    alone_for_ += dt;
     if (last_) {
       const Eigen::Vector3d step = x.p - last_->p;
       if (step.squaredNorm() < least_step2) return;
       turned_ += up_W.dot(last_->R * (last_->R.inverse() * x.R).Log());
       by_legs_ += effect_of(x.R.matrix(), x.R.inverse() * step);
       by_gyro_ += turned_ * up_W.cross(step);
+      by_drift_ += 0.5 * alone_for_ * alone_for_ * up_W.cross(step);
     }
     last_ = x.pose();
     return;
@@ -87,9 +92,11 @@ void LegMotionError::learn(const Eigen::Vector3d& up_W) {
 PoseCovariance LegMotionError::error(const State& x) const {
   PoseCovariance out = PoseCovariance::Zero();
   out.bottomRightCorner<3, 3>() = by_legs_ * (P_ + varying * varying * Eigen::Matrix<double, 9, 9>::Identity()) * by_legs_.transpose();
-  Eigen::Matrix<double, 6, 1> by_gyro;
-  by_gyro << turned_ * (x.R.inverse() * -x.g.normalized()), by_gyro_;
-  out += gyro_scale * gyro_scale * by_gyro * by_gyro.transpose();
+  const Eigen::Vector3d up_I = x.R.inverse() * -x.g.normalized();
+  Eigen::Matrix<double, 6, 1> by_gyro, by_drift;
+  by_gyro << turned_ * up_I, by_gyro_;
+  by_drift << 0.5 * alone_for_ * alone_for_ * up_I, by_drift_;
+  out += gyro_scale * gyro_scale * by_gyro * by_gyro.transpose() + gyro_drift * gyro_drift * by_drift * by_drift.transpose();
   return out;
 }
 

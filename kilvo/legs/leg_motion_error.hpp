@@ -3,8 +3,8 @@
 // noise term models it: it grows with the way, and a way back undoes it in part.
 //
 // Where the body moves with v the legs measure (I + M) v. M is learnt while something else measures the pose. While nothing does, what is
-// not known of M, and the scale of the gyro, are parameters that are considered, not estimated (Schmidt 1966): their effect on the pose is
-// summed up along the way.
+// not known of M, the scale of the gyro and the drift of its bias (it warms up) are parameters that are considered, not estimated (Schmidt
+// 1966): their effect on the pose is summed up along the way.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,9 +39,11 @@ class LegMotionError {
   // Of what is not known since the pose was measured.
   std::optional<SE3> last_;
   Effect by_legs_ = Effect::Zero();
-  Eigen::Vector3d by_gyro_ = Eigen::Vector3d::Zero();  // m per unit
-  double turned_ = 0;                                  // about the vertical, rad
-  bool is_known_ = false, measured_ = false;           // all of the pose; since the last state
+  Eigen::Vector3d by_gyro_ = Eigen::Vector3d::Zero();   // m per unit
+  double turned_ = 0;                                   // about the vertical, rad
+  Eigen::Vector3d by_drift_ = Eigen::Vector3d::Zero();  // m per rad/s^2
+  double alone_for_ = 0;                                // since something else measured the heading, s
+  bool is_known_ = false, measured_ = false;            // all of the pose; since the last state
   // Since a comparison began: sums over time of what the legs measure too much, world frame.
   struct Comparison {
     Eigen::Vector3d off = Eigen::Vector3d::Zero();  // m

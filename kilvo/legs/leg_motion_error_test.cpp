@@ -13,23 +13,23 @@ constexpr double mount = 0.01, length = 0.01, gyro_scale = 0.003;  // one standa
 
 struct Error {
   Eigen::Vector3d tilt_of_legs = Eigen::Vector3d::Zero();  // rad, in the IMU frame
-  double length = 0, gyro_scale = 0;
+  double length = 0, gyro_scale = 0, gyro_drift = 0;  // rad/s^2
 };
 
-/// A way of `steps` of 1 cm along x of the IMU, turning by `turn` each.
+/// A way of `steps` of 1 cm along x of the IMU, turning by `turn` each, at intervals of dt (s).
 struct Way {
   State end;
   LegMotionError error;
 };
-Way walked(int steps, double turn, const Error& e) {
+Way walked(int steps, double turn, const Error& e, double dt = 0) {
   Way way;
   State& x = way.end;
   x.g = {0, 0, -standard_gravity};
   way.error.add(x, {}, 0, 0, true);
   for (int i = 0; i < steps; ++i) {
-    x.R = x.R * SO3::Exp({0, 0, (1 + e.gyro_scale) * turn});
+    x.R = x.R * SO3::Exp({0, 0, (1 + e.gyro_scale) * turn + e.gyro_drift * (i + 0.5) * dt * dt});
     x.p += x.R * (SO3::Exp(e.tilt_of_legs) * Eigen::Vector3d((1 + e.length) * 0.01, 0, 0));
-    way.error.add(x, {}, 0, 0, true);
+    way.error.add(x, {}, 0, dt, true);
   }
   return way;
 }
@@ -51,6 +51,14 @@ TEST(LegMotionError, AnErrorOfOneStandardDeviationIsOneStandardDeviationOff) {
     EXPECT_NEAR(squared(walked(1000, turn, {{0, 0, 0}, length, 0}), truth), 1, 0.1);
     EXPECT_NEAR(squared(walked(1000, turn, {{0, 0, 0}, 0, gyro_scale}), truth), turn == 0 ? 0 : 1, 0.1);
   }
+}
+
+TEST(LegMotionError, AGyroThatWarmsUpTurnsTheWay) {
+  constexpr double drift = 2e-5, dt = 0.05;  // of one standard deviation; 50 s
+  const Way truth = walked(1000, 0.002, {}, dt);
+  Error warming;
+  warming.gyro_drift = drift;
+  EXPECT_NEAR(squared(walked(1000, 0.002, warming, dt), truth), 1, 0.1);
 }
 
 // Ten metres in a circle: a leg that is too long makes a larger circle, but a mount that is pitched climbs all the way.

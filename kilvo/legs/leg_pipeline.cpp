@@ -72,7 +72,7 @@ void LegPipeline::pose_is_measured(const Eigen::Matrix3d& unknown) {
 PoseCovariance LegPipeline::description_error(const State& x) const {
   PoseCovariance out = motion_error_.error(x);
   const Eigen::Vector3d up_W = -x.g.normalized();
-  out.bottomRightCorner<3, 3>() += level_ground_.stair_variance() * up_W * up_W.transpose();
+  out.bottomRightCorner<3, 3>() += (level_ground_.stair_variance() + level_ground_.floor_variance()) * up_W * up_W.transpose();
   return out;
 }
 

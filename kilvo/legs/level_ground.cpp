@@ -43,6 +43,7 @@ void LevelGround::restart() {
   has_come_down_.reset();
   floor_.reset();
   is_level_ = false;
+  has_left_floor_ = true;
 }
 
 double LevelGround::step_variance() const { return std::max(least_step_noise * least_step_noise, noise_.variance()); }
@@ -123,15 +124,28 @@ void LevelGround::stands_at(std::size_t side, const Eigen::Vector3d& pc_W) {
   has_come_down_.reset();
 }
 
+// The first foothold, which is all that is known of the height, until it is another floor that turns out to be level.
+void LevelGround::find_floor(const Eigen::Vector3d& p_W, const Estimate& e) {
+  has_left_floor_ = has_left_floor_ || !is_level_;
+  const double higher = floor_ ? up_W_.dot(p_W - *floor_) : 0;
+  if (floor_ && (!is_level_ || std::abs(higher) < same_floor)) {
+    has_left_floor_ = !is_level_;
+    return;
+  }
+  floor_variance_ = up_W_.dot(e.P.block<3, 3>(at::p, at::p) * up_W_);
+  // Where no slope or stair led there, it may be the same floor.
+  if (!has_left_floor_) floor_variance_ += wrong_share * wrong_share * higher * higher;
+  floor_ = floor_ ? last_.value_or(p_W) : p_W;
+  has_left_floor_ = false;
+}
+
 std::optional<GroundPatch> LevelGround::touchdown(std::size_t side, const Eigen::Vector3d& p_W, const Estimate& e) {
   if (!p_W.allFinite() || !e.x.R.matrix().allFinite() || !(e.x.g.norm() > 0)) return std::nullopt;  // a state that is thrown away
   if (++touchdowns_ == touchdowns_of_a_walk) first_ = e.t;
   if (last_) learn(p_W - *last_, e.x.R);
   find_vertical(e);
   is_level_ = level_.probability > (is_level_ ? hardly_level : surely_level);
-  // The first foothold, which is all that is known of the height, until it is another floor that turns out to be level.
-  if (!floor_) floor_ = p_W;
-  if (is_level_ && std::abs(up_W_.dot(p_W - *floor_)) > same_floor) floor_ = last_.value_or(p_W);
+  find_floor(p_W, e);
   last_ = p_W;
   has_come_down_ = side;
   if (!is_level_) return std::nullopt;

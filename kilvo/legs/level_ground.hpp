@@ -36,8 +36,10 @@ class LevelGround {
   double stair_variance() const { return stair_variance_; }
   /// The feet are no longer where they stood.
   void restart();
+  /// Variance of the height of the floor that is walked on, m^2: what was known of it when the first foot came down there.
+  double floor_variance() const { return floor_variance_; }
   /// Something else has measured the height.
-  void height_is_measured() { stair_variance_ = 0; }
+  void height_is_measured() { stair_variance_ = floor_variance_ = 0; }
 
   /// The vertical once it has been settled for good, by which the world may be levelled: unit vector, upwards, world frame.
   const std::optional<Eigen::Vector3d>& vertical() const { return vertical_W_; }
@@ -55,6 +57,7 @@ class LevelGround {
   double step_variance() const;
   void learn(const Eigen::Vector3d& step_W, const SO3& R);
   void find_vertical(const Estimate& e);
+  void find_floor(const Eigen::Vector3d& p_W, const Estimate& e);
 
   Hypothesis level_, sloped_;
   RunningStatistics noise_;  // of the height of a step, m
@@ -64,8 +67,8 @@ class LevelGround {
   std::optional<Eigen::Vector3d> vertical_W_;
   std::optional<Eigen::Vector3d> last_;  // foothold
   std::optional<std::size_t> has_come_down_;
-  double stair_variance_ = 0;
-  bool is_level_ = false;
+  double stair_variance_ = 0, floor_variance_ = 0;
+  bool is_level_ = false, has_left_floor_ = false;
   std::optional<Eigen::Vector3d> floor_;  // a foothold on the level ground that was walked on last
 };
 

@@ -15,6 +15,7 @@ class Walk {
   double slope = 0;            // of the ground along x of the world, true
   double heading = 0;          // rad
   double tilt_sigma = 0.0005;  // of the vertical, rad
+  double height_sigma = 0;     // m
 
   // Half of the height of each foothold over the ground that is reported is corrected.
   std::optional<GroundPatch> walk(int steps) {
@@ -32,6 +33,7 @@ class Walk {
       e.x.g = {0, 0, -9.81};
       e.P.setZero();
       e.P.diagonal().segment<3>(at::g).setConstant(9.81 * 9.81 * tilt_sigma * tilt_sigma);
+      e.P(at::p + 2, at::p + 2) = height_sigma * height_sigma;
       out = ground.touchdown(side, foothold, e);
       if (out) foothold.z() -= 0.5 * out->height_of(foothold);
       ground.stands_at(side, foothold);
@@ -97,6 +99,22 @@ TEST(LevelGround, SettlesTheVerticalWhenGravityIsKnownOrAfterAWhile) {
   EXPECT_FALSE(unknown.ground.vertical()) << "12 s";
   EXPECT_FALSE(unknown.walk(10)->measures_gravity);
   EXPECT_TRUE(unknown.ground.vertical());
+}
+
+// The rows of a floor hold the height over it; what was not known of the height when it began stays unknown.
+TEST(LevelGround, TheHeightOfAFloorIsAsUncertainAsItWasWhenTheFloorWasBegun) {
+  Walk walk;
+  walk.walk(20);
+  EXPECT_EQ(walk.ground.floor_variance(), 0);
+  walk.height_sigma = 0.05;
+  walk.foothold.z() += 0.15;
+  walk.walk(15);
+  EXPECT_NEAR(walk.ground.floor_variance(), 0.05 * 0.05, 1e-4);
+  walk.height_sigma = 0.01;
+  walk.walk(15);
+  EXPECT_NEAR(walk.ground.floor_variance(), 0.05 * 0.05, 1e-4) << "its rows do not measure it";
+  walk.ground.height_is_measured();
+  EXPECT_EQ(walk.ground.floor_variance(), 0);
 }
 
 TEST(LevelGround, NothingIsLeftOfAFloorAfterARestart) {

@@ -11,13 +11,16 @@ constexpr double prior_averages = 3, memory_averages = 15;
 constexpr double first_guess = 0.1;
 // The state follows the sole in part, so that less is seen than there is; and what is alike at all steps does not average out.
 constexpr double common = 2;
+// Two stances beyond three standard deviations of the noise need no more.
+constexpr double gate2 = 3;
 
 }  // namespace
 
 SoleNoise::SoleNoise(const LegConfig& config)
     : config_(config),
       across_(first_guess * first_guess, 0, prior_averages, memory_averages),
-      upwards_(config.vertical_velocity_sigma * config.vertical_velocity_sigma, 0, prior_averages, memory_averages) {}
+      upwards_(config.vertical_velocity_sigma * config.vertical_velocity_sigma, 0, prior_averages, memory_averages),
+      alike_(0, 0, prior_averages, memory_averages) {}
 
 void SoleNoise::add(std::size_t side, const Eigen::Vector3d& velocity_W, const Eigen::Vector3d& up_W, double dt,
                     std::optional<double> sigma_v) {
@@ -27,6 +30,8 @@ void SoleNoise::add(std::size_t side, const Eigen::Vector3d& velocity_W, const E
   if (sum.time < config_.velocity_correlation) return;
   const Eigen::Vector3d mean = sum.way / sum.time;
   const double up = up_W.dot(mean);
+  sum = {};
+  if (!mean.allFinite()) return;  // of a state that is thrown away
   across_.add(0.5 * (mean.squaredNorm() - up * up), 1);
   if (sigma_v) {
     add_rise(side, up, *sigma_v * *sigma_v);
@@ -34,34 +39,26 @@ void SoleNoise::add(std::size_t side, const Eigen::Vector3d& velocity_W, const E
     restart();
     upwards_.add(up * up, 1);
   }
-  sum = {};
 }
 
 void SoleNoise::restart() {
   last_rise_ = {};
-  rises_ = 0;
+  alike_ = RunningStatistics(0, 0, prior_averages, memory_averages);
 }
 
 void SoleNoise::add_rise(std::size_t side, double up, double variance_v) {
-  // What both feet show, beyond three standard deviations.
-  constexpr double beyond = 9;
-  const double variance = vertical() * vertical();
-  const double other = last_rise_[1 - side].value_or(0), both = up * other > 0 ? std::min(std::abs(up), std::abs(other)) : 0;
+  const auto other = std::exchange(last_rise_[1 - side], std::nullopt);
   last_rise_[side] = up;
-  if (both * both > beyond * (variance_v + 0.5 * variance)) {
-    rise_ = 0.5 * (up + other);
-    restart();
-    sum_ = {};
-    return;
-  }
-  // What is alike at all steps is an error of the state; one average alone must not raise the noise.
-  rises_ = std::min(rises_ + 1, memory_averages);
-  const double off = up - (rises_ > 1 ? usual_rise_ : 0);
-  usual_rise_ = up - off * (1 - 1 / rises_);
-  if (rises_ > 1) upwards_.add((1 - 1 / rises_) * std::min(off * off, variance_v + 0.5 * variance), 1);
+  if (!other) return;
+  const double both = up * *other, noise2 = vertical() * vertical();
+  upwards_.add(0.5 * (up - *other) * (up - *other), 1);
+  alike_.add(both, 1);
+  const double at_once = both > 0 ? std::min(up * up, *other * *other) - gate2 * noise2 : 0;
+  const double beyond = std::max(alike_.mean(), at_once) - variance_v;
+  if (beyond > 0) rise_ = std::sqrt(beyond);
 }
 
 double SoleNoise::horizontal() const { return std::max(config_.velocity_sigma, common * std::sqrt(across_.mean())); }
-double SoleNoise::vertical() const { return std::max(config_.vertical_velocity_sigma, common * std::sqrt(upwards_.mean())); }
+double SoleNoise::vertical() const { return std::max(config_.vertical_velocity_sigma, std::sqrt(upwards_.mean())); }
 
 }  // namespace kilvo

@@ -14,12 +14,15 @@ namespace kilvo {
 
 /// Velocity of a contact point, averaged over the correlation time of its noise: a sole that rolls, slides, gives way or is measured badly
 /// does so for all of that time. Never less than the settings say.
+///
+/// While nothing but the legs measures the vertical velocity, noise and error of the state are told apart as Mehra (1970) does: the noise
+/// of a stance is its own, so that what successive stances of opposite feet have in common is an error of the state.
 class SoleNoise {
  public:
   explicit SoleNoise(const LegConfig& config);
 
-  /// `velocity_W`: of the point on which this foot stands, m/s; `up_W`: unit vector against gravity; `sigma_v`: of the state's velocity,
-  /// m/s, while nothing but the legs measures it.
+  /// `velocity_W`: of the point on which this foot stands, m/s; `up_W`: unit vector against gravity; `sigma_v`: what the vertical velocity
+  /// of the state may be wrong by, m/s, while nothing but the legs measures it.
   void add(std::size_t side, const Eigen::Vector3d& velocity_W, const Eigen::Vector3d& up_W, double dt,
            std::optional<double> sigma_v = std::nullopt);
   /// The foot leaves, or stands on another place.
@@ -30,8 +33,8 @@ class SoleNoise {
   double horizontal() const;  // standard deviation of each axis, m/s
   double vertical() const;    // m/s
 
-  /// Once: the vertical velocity (m/s, upwards) that both soles seem to have, when that is an error of the state. A sole may roll and
-  /// slide, but the ground holds its height: what both seem to do, one after the other, shows a push that the IMU has not measured.
+  /// Once: by how much more the vertical velocity of the state may be wrong than it reports, m/s (one standard deviation). A sole may roll
+  /// and slide, but the ground holds its height: what both seem to do, one after the other, shows a push that the IMU has not measured.
   std::optional<double> take_rise() { return std::exchange(rise_, std::nullopt); }
 
  private:
@@ -43,8 +46,8 @@ class SoleNoise {
   LegConfig config_;
   std::array<Sum, 2> sum_;
   RunningStatistics across_, upwards_;              // squares, (m/s)^2
+  RunningStatistics alike_;                         // products of successive averages of opposite feet, (m/s)^2
   std::array<std::optional<double>, 2> last_rise_;  // m/s, the last average of each foot
-  double usual_rise_ = 0, rises_ = 0;               // m/s, of the last averages; how many
   std::optional<double> rise_;
 };
 

@@ -26,6 +26,8 @@ constexpr double entry_time = 0.02;
 // Of two feet that stand, the lighter one counts less: a sole that carries little slides and rolls. So much is left to it at least.
 constexpr double least_load = 0.01;
 constexpr double shortest_step = 1e-4;  // s
+// What descriptions and sinking soles make of the way as height: both feet show it, and it is no error of the state.
+constexpr double described_share = 0.015;
 
 // How much each corner of a sole carries, which adds up to one.
 std::array<double, max_corners> share_of_corners(const FootPose& pose, const State& x, const Eigen::Vector3d& omega, double rolling) {
@@ -197,7 +199,8 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     const Eigen::Vector3d velocity = velocity_W(x, foot.point.p, foot.point.v, omega);
     const double moving2 = velocity.squaredNorm();
     if (phase > config_.entry_delay + entry_time)
-      noise_.add(side, velocity, -x.g.normalized(), out.dt, on_legs_alone_ ? std::optional(sigma_v) : std::nullopt);
+      noise_.add(side, velocity, -x.g.normalized(), out.dt,
+                 on_legs_alone_ ? std::optional(std::hypot(sigma_v, described_share * x.v.norm())) : std::nullopt);
     const double usual2 = contacts.sole_speed * contacts.sole_speed / 3;
     const double noise2 = std::max(config_.velocity_sigma * config_.velocity_sigma, usual2) + sigma_v * sigma_v;
     const double entering = std::clamp(1.0 - (phase - config_.entry_delay) / entry_time, 0.0, 1.0);
