@@ -1,6 +1,6 @@
 // The estimator on a robot. A fast thread answers each IMU and leg sample at once; a slow thread runs the estimator with everything, and
 // hands its state over after each sweep and image. A third one carries the outputs away.
-// docs/decisions/2026-11-21-the-fast-thread-runs-ahead.md
+// docs/decisions/live.md
 #pragma once
 
 #include <array>
@@ -42,7 +42,7 @@ class LiveRunner {
  public:
   /// Each is called by the third thread, in time order by itself. `state`: of every leg sample, or IMU sample. `sweep`: of every sweep and
   /// image, and whatever has events, as the estimator gives them; their states are of the past. Once gravity is known both are in the level
-  /// world (Output::R_LW), which one output of `sweep` reports as an event: docs/decisions/2026-11-23-level-live.md.
+  /// world (Output::R_LW), which one output of `sweep` reports as an event: docs/decisions/live.md.
   struct Sinks {
     std::function<void(Output)> state, sweep;
   };

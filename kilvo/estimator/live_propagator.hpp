@@ -1,6 +1,6 @@
 // The asynchronous phase by itself, ahead of the estimator: what the IMU and the legs say at once, on top of a state that a sweep or an
 // image still waits to correct. A value that the estimator fills (Estimator::fork) and that then goes on alone, until the next one. It runs
-// the same History and LegPipeline. docs/decisions/2026-11-21-the-fast-thread-runs-ahead.md says why.
+// the same History and LegPipeline. docs/decisions/live.md says why.
 #pragma once
 
 #include "kilvo/estimator/history.hpp"

@@ -1,4 +1,4 @@
-// Which foot stands on the ground, without force sensors, and how surely (paper, Section V; docs/decisions say where this departs from it).
+// Which foot stands on the ground, without force sensors, and how surely (paper, Section V; docs/decisions/contact.md: where this departs).
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
 // Which feet carry: a Bayes filter over the four states of a biped (both feet, the left one, the right one, none). What each cue looks like
-// in each state is learnt from this robot while it walks; docs/decisions/2026-11-22-contact-as-probability.md says why.
+// in each state is learnt from this robot while it walks; docs/decisions/contact.md says why.
 #pragma once
 
 #include <array>

@@ -18,7 +18,7 @@ struct LegConfig {
   double ground_sigma = 0.02;              // m
   double entry_delay = 0.016;              // s
   double gate = 5.0;
-  // What the paper has otherwise: docs/decisions/2026-11-22-what-the-paper-has-otherwise.md.
+  // What the paper has otherwise: docs/decisions/paper.md.
   int iterations = 1;
   std::string adaptation = "foot";  // foot | row | none
   std::string height = "ki";        // ki | always | never

@@ -1,6 +1,6 @@
 // The paper's contact estimation (Section V), as it is printed: deviations from the robot's own statistics of its first swing, with the
-// same two numbers (theta_d, N_d) for every robot and gait. Selected by legs.contact: paper; docs/decisions say what the text leaves open
-// and how it is read here.
+// same two numbers (theta_d, N_d) for every robot and gait. Selected by legs.contact: paper. docs/decisions/paper.md: what the text leaves
+// open and how it is read here.
 #pragma once
 
 #include <Eigen/Core>

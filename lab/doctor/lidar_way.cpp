@@ -9,8 +9,7 @@
 namespace kilvo::lab {
 namespace {
 
-// What an IMU that walks is off by over a tenth of a second, impacts that alias included: as docs/decisions/2026-11-21-process-noise.md has
-// it.
+// What an IMU that walks is off by over a tenth of a second, impacts that alias included (docs/decisions/imu-faults.md).
 constexpr double accel_density = 0.013, gyro_density = 4e-4;  // m/s^2 and rad/s per sqrt(Hz)
 constexpr double longest_step = 0.35;                         // s between sweeps
 

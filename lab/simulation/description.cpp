@@ -52,7 +52,7 @@ std::string simulated_config(const SimulatorConfig& config, const std::string& u
   out += fmt::format("robot:\n  urdf: {}\n  feet:\n", urdf) + foot_line("left", shape) + foot_line("right", shape);
   out += fmt::format("\nimu:\n  topic: {}\n  rate: {}\n", topics[0], config.imu.delivery.rate);
   out += fmt::format("  gyro_noise: {:.10g}\n  accel_noise: {:.10g}\n", config.imu.gyro_noise, config.imu.accel_noise);
-  // Measured with a noise-free IMU from true states over 0.1 s (docs/decisions/2026-11-21-what-the-covariance-counts.md).
+  // Measured with a noise-free IMU from true states over 0.1 s (docs/decisions/covariance.md).
   out += "  velocity_noise: 0.00016  # its impacts ring softly: they alias less than those of a real robot do\n";
   out += fmt::format("  T_link_imu:\n    link: torso_link\n    p: {}\n    R: {}\n", list_of(T_torso_imu.p), list_of(T_torso_imu.R));
   out += fmt::format("\nlegs:\n  topic: {}\n  type: joints\n  rate: {}\n", topics[1], config.joints.delivery.rate);

@@ -1,4 +1,4 @@
-// The world of a live run is levelled once, while it runs: docs/decisions/2026-11-23-level-live.md.
+// The world of a live run is levelled once, while it runs: docs/decisions/live.md.
 #include <cstdio>
 #include <gtest/gtest.h>
 
