@@ -1,6 +1,6 @@
 """Holds documents, public names, comments and messages to the glossary of docs/notation.md: the words that it replaces are not used.
 
-Looked at: README.md, CHANGELOG.md's unreleased part, docs/ (the dated decisions apart), and all sources."""
+Looked at: README.md, CHANGELOG.md's unreleased part, docs/, and all sources."""
 import argparse
 import glob
 import os
@@ -18,7 +18,7 @@ GLOSSARY = "docs/notation.md"
 
 
 def texts(root: str) -> list[tuple[str, str]]:
-    files = ["README.md", *glob.glob("docs/*.md", root_dir=root), *cpp_text.sources(root)]
+    files = ["README.md", *glob.glob("docs/**/*.md", root_dir=root, recursive=True), *cpp_text.sources(root)]
     found = [(path, cpp_text.read(root, path)) for path in files if os.path.exists(os.path.join(root, path)) and path != GLOSSARY]
     if os.path.exists(os.path.join(root, "CHANGELOG.md")):
         found.append(("CHANGELOG.md", cpp_text.read(root, "CHANGELOG.md").split("\n## [0")[0]))

@@ -19,8 +19,10 @@ class Words(unittest.TestCase):
         self.assertEqual(len(self.faults("kilvo/legs/x.hpp", "// It is said that\nclass Footfall;\n")), 2)
         self.assertEqual(len(self.faults("CHANGELOG.md", "## [Unreleased]\n- is said\n\n## [0.1.0]\n- is said\n")), 1)
 
-    def test_leaves_decisions_the_glossary_and_real_rooms_alone(self):
-        self.assertEqual(self.faults("docs/decisions/old.md", "forerunner\n"), [])
+    def test_finds_old_words_in_decisions(self):
+        self.assertRegex(self.faults("docs/decisions/live.md", "The forerunner runs.\n")[0], r"^docs/decisions/live.md:1: `forerunner`")
+
+    def test_leaves_the_glossary_and_real_rooms_alone(self):
         self.assertEqual(self.faults("docs/notation.md", "forerunner\n"), [])
         self.assertEqual(self.faults("README.md", "A room with a floor, walls and a door.\n"), [])
 
