@@ -6,7 +6,7 @@
 #   make test-tsan  the tests with threads under the thread sanitizer
 #   make bench      time the functions; RECORDINGS=DIR: time and judge whole recordings as well
 #   make tables     RECORDINGS=DIR: every modality on every recording, as Markdown
-#   make check      layout, modules, sizes, headers, clang-tidy (files that changed since they last passed; ALL=1: every file)
+#   make check      layout, modules, sizes, constants, headers, clang-tidy (files that changed since they last passed; ALL=1: every file)
 #   make golden     seventy runs must give the bytes of tests/golden/manifest.json (a refactoring changes none)
 #   make format     rewrite the sources in the one layout
 #   make fuzz       fuzz the readers, SECONDS_EACH=60 each
@@ -80,6 +80,7 @@ golden: configure-program
 check: dependencies-dev configure
 	@scripts/check_modules
 	@scripts/check_sizes
+	@scripts/check_constants
 	@clang-format-14 --dry-run --Werror $(SOURCES)
 	@scripts/check_headers --build $(BUILD)
 	@scripts/check_tidy --build $(BUILD) $(if $(ALL),--all)
