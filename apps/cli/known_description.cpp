@@ -102,14 +102,11 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
     std::vector<WrongDescription> again;
     for (const lab::Finding& f : longer.findings) again.push_back(lab::as_wrong(f, first.t, first.after));
     if (std::ranges::any_of(again, [&](const WrongDescription& w) { return known.stops(w); })) wrong = again;
-    if (longer.settled) {
-      for (WrongDescription& w : wrong) {
-        const auto is_same = [&w](const WrongDescription& other) { return other.finding.cause == w.finding.cause; };
-        if (std::ranges::none_of(again, is_same)) lab::refute(w);
-      }
-      if (!std::ranges::any_of(wrong, [&](const WrongDescription& w) { return known.stops(w); }))
-        known.wrong.insert(known.wrong.end(), again.begin(), again.end());
+    for (WrongDescription& w : wrong) {
+      if (lab::is_refuted(w.finding, longer)) lab::refute(w);
     }
+    if (!std::ranges::any_of(wrong, [&](const WrongDescription& w) { return known.stops(w); }))
+      known.wrong.insert(known.wrong.end(), again.begin(), again.end());
     for (const WrongDescription& w : wrong) {
       if (known.stops(w)) lab::put(known.mended, w.finding.changes);
     }

@@ -52,6 +52,15 @@ WrongDescription as_wrong(const Finding& finding, Time t, double after) {
   return {finding, t, after, spoils(finding), is_mendable(finding)};
 }
 
+bool is_refuted(const Finding& finding, const Diagnosis& longer) {
+  const auto is_same = [&finding](const Finding& other) { return other.cause == finding.cause; };
+  if (std::ranges::any_of(longer.findings, is_same)) return false;
+  // The LiDAR is judged against the IMU, whether the legs can be or not.
+  const auto is_open = [](const Check& c) { return c.sensor == Sensor::lidar && c.verdict == Check::Verdict::unknown; };
+  const bool lidar_is_good = !longer.seems_wrong[static_cast<std::size_t>(Sensor::lidar)] && std::ranges::none_of(longer.checks, is_open);
+  return longer.settled || (finding.sensor == Sensor::lidar && lidar_is_good);
+}
+
 void refute(WrongDescription& wrong) {
   wrong.spoils = wrong.is_mendable = false;
   wrong.finding.text += "; more of the data does not show it, and the description is used as it is";

@@ -22,7 +22,9 @@ struct WrongDescription {
 
 /// What the finding means for a run.
 WrongDescription as_wrong(const Finding& finding, Time t, double after);
-/// More data show the description to be right: what is left is a warning, and nothing is to be changed.
+/// Whether more data show the description to be right: they do not find it again, and leave nothing open.
+bool is_refuted(const Finding& finding, const Diagnosis& longer);
+/// What is left of it then is a warning, and nothing is to be changed.
 void refute(WrongDescription& wrong);
 
 class DescriptionWatch {

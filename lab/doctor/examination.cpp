@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fmt/core.h>
 #include <fmt/format.h>
+#include <functional>
 
 namespace kilvo::lab {
 
@@ -164,7 +165,8 @@ Diagnosis Examination::run() {
   examine_camera();
   blame_imu_for_all();
   const bool legs = recorded_.legs.size() >= 100 && robot_.legs.type == "joints";
-  diagnosis_.settled = !open_ && (recorded_.sweeps.size() < 30 || lidar_.known) && (!legs || (legs_.known && legs_turned()));
+  const bool open = std::ranges::any_of(diagnosis_.seems_wrong, std::identity());
+  diagnosis_.settled = !open && (recorded_.sweeps.size() < 30 || lidar_.known) && (!legs || (legs_.known && legs_turned()));
   return diagnosis_;
 }
 

@@ -120,6 +120,8 @@ class Examination {
   SE3 T_link_imu() const { return robot_.imu.T_link_imu; }
   void check(Sensor sensor, const std::string& what, Check::Verdict verdict, const std::string& detail);
   void find(Finding finding);
+  /// Something of this sensor is off, and more data would make it sure.
+  bool& seems_wrong(Sensor sensor) { return diagnosis_.seems_wrong[static_cast<std::size_t>(sensor)]; }
   void find_offset(Sensor sensor, double offset, double sigma, const std::string& evidence);
   void refine_rotation(Sensor sensor, const std::string& what, const SO3& described, const SO3& measured, const Eigen::Vector3d& sigma,
                        double method, const std::string& key);
@@ -138,7 +140,6 @@ class Examination {
   std::optional<LegHypothesis> leg_mend_;
   std::optional<SO3> leg_start_;  // mount of the IMU on its link, far from the described one, from which that is looked for
   bool point_times_are_good_;
-  bool open_ = false;                         // something seems wrong, and more data would make it sure
   double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock
   std::optional<TranslationFit> translation_;
   std::optional<StanceFit> stances_;

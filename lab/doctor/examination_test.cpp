@@ -218,6 +218,23 @@ TEST(DescriptionWatch, WhatMoreDataRefuteIsAWarningAndChangesNothing) {
   EXPECT_THAT(wrong.finding.text, testing::HasSubstr("the description is used as it is"));
 }
 
+// Feet of a runner who slips may never show whether their mount is right.
+TEST(DescriptionWatch, ALiDARIsClearedByMoreDataThoughTheLegsStayUnknown) {
+  Finding finding{Sensor::lidar, "lidar_position", "", "", "", 0.05, "m", {}, true};
+  Diagnosis longer;
+  longer.checks = {{Sensor::lidar, "position of the mount", Check::Verdict::good, ""},
+                   {Sensor::legs, "clock", Check::Verdict::unknown, ""}};
+  EXPECT_TRUE(is_refuted(finding, longer));
+  finding.sensor = Sensor::imu;
+  EXPECT_FALSE(is_refuted(finding, longer));
+  finding.sensor = Sensor::lidar;
+  longer.seems_wrong[static_cast<std::size_t>(Sensor::lidar)] = true;
+  EXPECT_FALSE(is_refuted(finding, longer));
+  longer.seems_wrong = {};
+  longer.findings = {finding};
+  EXPECT_FALSE(is_refuted(finding, longer));
+}
+
 TEST(Doctor, WhoStandsStillIsNotJudged) {
   Recorded recorded = walked().recorded;
   std::erase_if(recorded.imu, [](const InertialSample& s) { return s.t > 3; });

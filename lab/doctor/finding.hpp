@@ -1,6 +1,7 @@
 // What the checks found wrong: who, what, by how much, on what evidence, and which setting mends it.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -47,7 +48,8 @@ struct Check {
 struct Diagnosis {
   std::vector<Finding> findings;
   std::vector<Check> checks;
-  bool settled = false;  // each sense that is there moved enough to be judged
+  bool settled = false;                          // each sense that is there moved enough to be judged
+  std::array<bool, sensor_count> seems_wrong{};  // and more data would make it sure
   bool good() const { return findings.empty(); }
   /// Nothing could be judged at all.
   bool unknown() const;

@@ -83,7 +83,7 @@ void Examination::examine_leg_rotation() {
       diagnosis_.findings.back().evidence = "turning of the legs against the gyro's: " + detail;
     }
   } else {
-    open_ |= stances.good ? angle > leg_rotation_tolerance : !way.empty();
+    seems_wrong(Sensor::imu) |= stances.good ? angle > leg_rotation_tolerance : !way.empty();
     check(Sensor::imu, "rotation of its mount on the robot", uncertain > 3 ? Check::Verdict::unknown : Check::Verdict::good, detail);
   }
   if (stances.good) fit.explained = 1;  // the feet stand

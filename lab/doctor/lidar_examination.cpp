@@ -202,7 +202,7 @@ MountFit Examination::examine_lidar_rotation() {
           : note        ? Check::Verdict::note
                         : Check::Verdict::good,
           detail + (note ? ": could be calibrated" : ""));
-    open_ |= angle > lidar_rotation_tolerance;
+    seems_wrong(Sensor::lidar) |= angle > lidar_rotation_tolerance;
     return fit;
   }
   // Points that are mirrored turn as those of a LiDAR that is turned by half a turn do; their way differs.

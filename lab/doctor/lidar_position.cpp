@@ -41,7 +41,7 @@ void Examination::examine_lidar_position() {
       fmt::format("measured ({:.3f}, {:.3f}, {:.3f}) m, standard deviations ({:.3f}, {:.3f}, {:.3f}), described ({:.3f}, {:.3f}, {:.3f})",
                   fit.r.x(), fit.r.y(), fit.r.z(), sigma.x(), sigma.y(), sigma.z(), described.x(), described.y(), described.z());
   if (!wrong) {
-    open_ |= error.cwiseAbs().maxCoeff() > position_tolerance;
+    seems_wrong(Sensor::lidar) |= error.cwiseAbs().maxCoeff() > position_tolerance;
     check(Sensor::lidar, "position of the mount", sigma.maxCoeff() > 0.05 ? Check::Verdict::unknown : Check::Verdict::good, detail);
     return;
   }
