@@ -1,4 +1,4 @@
-# kilvo_module(NAME [UNIT files] [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
+# kilvo_module(NAME [UNIT files] [OPTIMIZATION level] [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
 #
 # One folder is one module is one CMake target, `kilvo_NAME` (alias `kilvo::NAME`): every *.cpp is compiled,
 # every *_test.cpp beside it goes into one test program `kilvo_NAME_test`. Every *.hpp compiles alone (scripts/check_headers).
@@ -21,8 +21,16 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_
 endif()
 target_compile_definitions(kilvo_flags INTERFACE "KILVO_WIDE=${KILVO_WIDE}")
 
+# kilvo_optimization(TARGET [level]): of a release, where the target has no loop that counts: it compiles in three quarters of the time. The
+# results keep their bytes at any level.
+function(kilvo_optimization target)
+  if(ARGC GREATER 1)
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O${ARGV1}>)
+  endif()
+endfunction()
+
 function(kilvo_module name)
-  cmake_parse_arguments(MODULE "" "UNIT" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
+  cmake_parse_arguments(MODULE "" "UNIT;OPTIMIZATION" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   file(GLOB tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp)
   file(GLOB fuzzers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_fuzz.cpp)
@@ -38,6 +46,7 @@ function(kilvo_module name)
     add_library(${target} STATIC ${sources})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:kilvo_flags> ${MODULE_PRIVATE})
+    kilvo_optimization(${target} ${MODULE_OPTIMIZATION})
     kilvo_precompile(${target})
     kilvo_unity(${target} ${MODULE_UNIT})
   else()
