@@ -63,7 +63,7 @@ bool is_refuted(const Finding& finding, const Diagnosis& longer) {
 
 void refute(WrongDescription& wrong) {
   wrong.spoils = wrong.is_mendable = false;
-  wrong.finding.text += "; more of the data does not show it, and the description is used as it is";
+  wrong.finding.remedy = "more of the data does not show it, and the description is used as it is";
   wrong.finding.changes.clear();
 }
 

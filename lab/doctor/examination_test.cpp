@@ -215,7 +215,7 @@ TEST(DescriptionWatch, WhatMoreDataRefuteIsAWarningAndChangesNothing) {
   ASSERT_TRUE(wrong.spoils && wrong.is_mendable);
   refute(wrong);
   EXPECT_FALSE(wrong.spoils || wrong.is_mendable || !wrong.finding.changes.empty());
-  EXPECT_THAT(wrong.finding.text, testing::HasSubstr("the description is used as it is"));
+  EXPECT_THAT(wrong.finding.remedy, testing::HasSubstr("the description is used as it is"));
 }
 
 // Feet of a runner who slips may never show whether their mount is right.
