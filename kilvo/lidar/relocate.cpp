@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numbers>
 #include <vector>
 
 #include "kilvo/filter/update.hpp"
@@ -12,9 +14,10 @@ namespace {
 // The nearest planes are the right ones within so much, m and rad (one sigma).
 constexpr double well_known_position = 0.08, well_known_rotation = 0.03;
 // The grid: what a registration starting from its points can reach.
-constexpr double step = 0.25, yaw_step = 0.09;  // m, rad
-constexpr int most_steps = 8, most_steps_up = 2, most_steps_yaw = 5;
-constexpr std::size_t probe_count = 160;  // clusters that are looked up for each pose of the grid
+constexpr double step = 0.25, yaw_step = 0.09;                         // m, rad
+constexpr int most_steps = 8, most_steps_up = 2, most_steps_yaw = 35;  // all round
+// Clusters that are looked up for each pose of a small grid, and then for the best of a large one.
+constexpr std::size_t probe_count = 160, few_probes = 32, small_grid = 4000;
 constexpr std::size_t finalists = 12;
 constexpr double near_surface = 0.08, per_metre = 0.02;  // m
 // So much of what meets a surface lies on it when the pose is right; a second pose must be worse by a tenth.
@@ -32,9 +35,9 @@ struct Probe {
   double reach;
 };
 
-std::vector<Probe> probes_of(std::span<const PointCluster> clusters) {
+std::vector<Probe> probes_of(std::span<const PointCluster> clusters, std::size_t count) {
   std::vector<Probe> out;
-  const std::size_t stride = std::max<std::size_t>(1, clusters.size() / probe_count);
+  const std::size_t stride = std::max<std::size_t>(1, clusters.size() / count);
   for (std::size_t i = 0; i < clusters.size(); i += stride) {
     const Eigen::Vector3d p = clusters[i].mean.cast<double>();
     out.push_back({p, near_surface + per_metre * p.norm()});
@@ -54,23 +57,29 @@ double score_of(const VoxelMap& map, std::span<const Probe> probes, const SE3& T
   return on / static_cast<double>(std::max<std::size_t>(1, probes.size()));
 }
 
-int steps(double sigma, double size, int most) {
-  return std::min(most, static_cast<int>(std::ceil(std::max(0.0, 3 * sigma - size / 2) / size)));
-}
+struct Grid {
+  std::vector<Candidate> poses;
+  bool is_whole = true;  // within three sigmas there is no other
+};
 
-std::vector<Candidate> grid_around(const Estimate& e) {
+Grid grid_around(const Estimate& e) {
+  Grid out;
+  const auto steps = [&out](double sigma, double size, int most) {
+    const int wanted = static_cast<int>(std::ceil(std::max(0.0, 3 * sigma - size / 2) / size));
+    out.is_whole = out.is_whole && wanted <= most;
+    return std::min(most, wanted);
+  };
   const Eigen::Vector3d up_W = -e.x.g.normalized();
   const Eigen::Vector3d sigma = e.P.diagonal().segment<3>(at::p).cwiseMax(0).cwiseSqrt();
   const Eigen::Vector3d up_I = e.x.R.matrix().transpose() * up_W;
   const double sigma_yaw = std::sqrt(std::max(0.0, up_I.dot(e.P.block<3, 3>(at::R, at::R) * up_I)));
   const int nx = steps(sigma.x(), step, most_steps), ny = steps(sigma.y(), step, most_steps), nz = steps(sigma.z(), step, most_steps_up);
-  const int nyaw = steps(sigma_yaw, yaw_step, most_steps_yaw);
-  std::vector<Candidate> out;
+  const int nyaw = steps(std::min(sigma_yaw, std::numbers::pi / 3), yaw_step, most_steps_yaw);
   for (int k = -nyaw; k <= nyaw; ++k) {
     const SO3 R = SO3::Exp(k * yaw_step * up_W) * e.x.R;
     for (int i = -nx; i <= nx; ++i) {
       for (int j = -ny; j <= ny; ++j) {
-        for (int h = -nz; h <= nz; ++h) out.push_back({{R, e.x.p + step * Eigen::Vector3d(i, j, h)}});
+        for (int h = -nz; h <= nz; ++h) out.poses.push_back({{R, e.x.p + step * Eigen::Vector3d(i, j, h)}});
       }
     }
   }
@@ -79,6 +88,11 @@ std::vector<Candidate> grid_around(const Estimate& e) {
 
 bool alike(const SE3& a, const SE3& b, double place, double heading) {
   return (a.p - b.p).norm() < place && (a.R.inverse() * b.R).Log().norm() < heading;
+}
+
+void score(std::span<Candidate> poses, const VoxelMap& map, std::span<const PointCluster> clusters, std::size_t probes) {
+  const std::vector<Probe> looked_up = probes_of(clusters, probes);
+  for (Candidate& c : poses) c.score = score_of(map, looked_up, c.T_WI);
 }
 
 // The best of the grid, no two of them neighbours.
@@ -134,18 +148,23 @@ bool needs_search(const Covariance& P, const PoseCovariance& known) {
 
 std::optional<FoundPose> find_pose(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL,
                                    const Estimate& expected, const LidarConfig& config, const Workers& workers) {
-  const std::vector<Probe> looked_up = probes_of(clusters);
-  std::vector<Candidate> grid = grid_around(expected);
-  for (Candidate& c : grid) c.score = score_of(map, looked_up, c.T_WI);
+  Grid grid = grid_around(expected);
+  if (grid.poses.size() > small_grid) {
+    score(grid.poses, map, clusters, few_probes);
+    std::ranges::stable_sort(grid.poses, std::greater{}, &Candidate::score);
+    grid.poses.resize(small_grid);
+  }
+  score(grid.poses, map, clusters, probe_count);
   const GridRegistration registration{map, clusters, p_IL, config, workers};
   std::vector<FoundPose> found;
-  for (const Candidate& c : best_of(std::move(grid))) found.push_back(registration.from(expected, c.T_WI));
+  for (const Candidate& c : best_of(std::move(grid.poses))) found.push_back(registration.from(expected, c.T_WI));
   // Nearly every point of a sweep that is in its place meets a surface: what met none counts against a pose as well.
   const auto worth = [&clusters](const FoundPose& f) {
     return f.share * std::sqrt(static_cast<double>(f.info.rows) / static_cast<double>(std::max<std::size_t>(1, clusters.size())));
   };
   const auto best = std::ranges::max_element(found, {}, worth);
-  if (best == found.end() || best->share < least_share) return std::nullopt;
+  // The right place may lie beyond a grid that had to be cut: then a place within has to explain all of the sweep.
+  if (best == found.end() || (grid.is_whole ? best->share : worth(*best)) < least_share) return std::nullopt;
   for (const FoundPose& other : found) {
     if (!alike(other.x.pose(), best->x.pose(), same_place, same_heading) && worth(other) > (1 - clearly) * worth(*best))
       return std::nullopt;

@@ -52,6 +52,29 @@ TEST(Relocation, FindsAPoseThatIsOffByAMetreAndAQuarterOfARadian) {
   }
 }
 
+// Seconds without an IMU: a walker may have turned round.
+TEST(Relocation, LooksAllRoundWhereTheHeadingIsUnknown) {
+  const Place place;
+  for (const double turned : {-1.5, 2.2}) {
+    const auto found =
+        find_pose(place.map, place.sweep(), Eigen::Vector3d::Zero(), place.guess({0.5, -0.4, 0}, turned, 0.3, 0.8), {}, place.workers);
+    ASSERT_TRUE(found);
+    EXPECT_LT((found->x.p - place.truth.p).norm(), 0.005);
+    EXPECT_LT((found->x.R.inverse() * place.truth.R).Log().norm(), 0.002);
+  }
+}
+
+// Where the robot really is was not looked at: what a part of the sweep lies on is not it, however well that part lies.
+TEST(Relocation, APlaceWithinASearchThatWasCutHasToExplainAllOfTheSweep) {
+  const Place place;
+  std::vector<PointCluster> sweep = place.sweep();
+  for (std::size_t i = 0; i < sweep.size(); ++i) sweep[i].mean.z() += i % 20 < 9 ? 50.F : 0.F;  // where no surface is known
+  const Estimate near = place.guess({0.3, 0, 0}, 0, 0.3, 0.1), cut = place.guess({0.3, 0, 0}, 0, 1.1, 0.1);
+  const auto find = [&](const Estimate& e) { return find_pose(place.map, sweep, Eigen::Vector3d::Zero(), e, {}, place.workers); };
+  EXPECT_TRUE(find(near));
+  EXPECT_FALSE(find(cut));
+}
+
 TEST(Relocation, FindsNothingWhereTheSweepIsOfAnotherPlace) {
   const Place place;
   std::vector<PointCluster> sweep = place.sweep();
