@@ -16,6 +16,7 @@ lab::RecordingOptions recording_options(const RunOptions& options, const lab::Se
   const bool with_legs = std::ranges::find(used, Sensor::legs) != used.end();
   if (with_legs && settings.leg_clock.clock != "stamp") out.leg_clock.emplace(settings.leg_clock, settings.robot);
   out.no_deskew = options.no_deskew;
+  out.with_colours = options.with_map;
   out.start = options.start;
   out.duration = options.duration;
   return out;

@@ -69,13 +69,23 @@ void ResultFiles::write_contacts(const Output& output) {
   if (!contacts_)
     contacts_.emplace(folder_ / "contacts.csv", "t,left,right,clearance_left,clearance_right,d_a,d_fv_left,d_fv_right,p_left,p_right");
   const Contacts& c = *output.contacts;
-  std::string line, t;
-  lab::append_seconds(t, output.t);
-  fmt::format_to(std::back_inserter(line), "{},{:d},{:d},{:.5f},{:.5f},{:.4g},{:.4g},{:.4g},{:.3f},{:.3f}", t, c.on[0], c.on[1],
-                 c.clearance[0], c.clearance[1], c.d_a, c.d_fv[0], c.d_fv[1], c.probability[0], c.probability[1]);
-  contacts_->write(line);
+  line_.clear();
+  lab::append_seconds(line_, output.t);
+  const std::size_t stamped = line_.size();
+  const auto add = [this](double x, int decimals) {
+    line_ += ',';
+    lab::append_fixed(line_, x, decimals);
+  };
+  for (const bool on : c.on) line_ += on ? ",1" : ",0";
+  for (const double clearance : c.clearance) add(clearance, 5);
+  fmt::format_to(std::back_inserter(line_), ",{:.4g},{:.4g},{:.4g}", c.d_a, c.d_fv[0], c.d_fv[1]);
+  for (const double p : c.probability) add(p, 3);
+  contacts_->write(line_);
   for (const auto& [stage, microseconds] : {std::pair("kinematic", output.kinematic_us), std::pair("contact", output.contact_us)}) {
-    timing_.write(fmt::format("{},{},{:.1f}", t, stage, microseconds));
+    line_.resize(stamped);
+    (line_ += ',') += stage;
+    add(microseconds, 1);
+    timing_.write(line_);
     run_summary_.stages.add(stage, microseconds);
   }
 }

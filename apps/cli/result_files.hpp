@@ -44,6 +44,7 @@ class ResultFiles {
   std::optional<Modality> last_modality_;
   std::optional<Time> last_state_;
   RunSummary run_summary_;
+  std::string line_;  // that is being written
 };
 
 }  // namespace kilvo::cli

@@ -136,14 +136,16 @@ class Run {
       skeleton_.add(*measurement);
       hold_against_description(*measurement);
       if (stopped_) break;
-      keep(estimator_.push(*std::move(measurement)));
+      outputs_.clear();
+      estimator_.push(*std::move(measurement), outputs_);
+      keep(outputs_);
       progress_.update(input.progress(), [this] { return progress_note(); });
-      interrupted = interrupt_.requested();
-      if (interrupted) break;
+      if ((interrupted = interrupt_.requested())) break;
     }
     input.stop();
     if (stopped_) return false;
-    keep(estimator_.finish());
+    outputs_ = estimator_.finish();
+    keep(outputs_);
     return interrupted;
   }
 
@@ -190,7 +192,7 @@ class Run {
       throw lab::ConfigError(fmt::format("{}: {} (topic {})", facts_.config_file, *why, source_.topic(Sensor::legs)));
   }
 
-  void keep(std::vector<Output> outputs) {
+  void keep(std::vector<Output>& outputs) {
     for (Output& output : outputs) {
       if (output.epoch > 0) continue;  // of another recording: failure() says so
       if (log_) log(output);
@@ -218,13 +220,11 @@ class Run {
 
   std::string progress_note() const {
     if (!estimator_.initialised()) return estimator_.waiting_for();
-    const RunSummary& run_summary = files_.run_summary();
-    return fmt::format("{} sweeps, {:.1f} m", run_summary.sweeps(), run_summary.path_length());
+    return fmt::format("{} sweeps, {:.1f} m", files_.run_summary().sweeps(), files_.run_summary().path_length());
   }
 
   std::string failure(bool interrupted) const {
-    if (interrupted) return "stopped by the user";
-    return failure_of(files_.run_summary(), estimator_, !source_.topic(Sensor::lidar).empty());
+    return interrupted ? "stopped by the user" : failure_of(files_.run_summary(), estimator_, !source_.topic(Sensor::lidar).empty());
   }
 
   void tell_end() const {
@@ -250,6 +250,7 @@ class Run {
   lab::RecordingSource source_;
   lab::FailingSource failing_;
   Estimator estimator_;
+  std::vector<Output> outputs_;  // of one measurement
   MapKeeper map_;
   ResultFiles files_;
   LevelFiles level_;

@@ -182,8 +182,8 @@ PoseCovariance Estimator::common_error_at(const State& x) const {
 
 void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts, double kinematic_us,
                      double contact_us) {
-  auto o = outputs_.next(e.t);
-  if (!o) return;
+  Output* const o = outputs_.next(e.t, out);
+  if (o == nullptr) return;
   o->epoch = epoch();
   o->x = e.x;
   o->P = e.P;
@@ -196,7 +196,6 @@ void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<
   o->vertical_W = legs_.vertical();
   o->kinematic_us = kinematic_us;
   o->contact_us = contact_us;
-  out.push_back(std::move(*o));
 }
 
 bool Estimator::fork(LivePropagator& into) const {

@@ -11,12 +11,12 @@ void OutputQueue::add_sweep(Output o) {
   sweeps_.push_back(std::move(o));
 }
 
-std::optional<Output> OutputQueue::next(Time t) {
-  if (last_ && t <= *last_) return std::nullopt;
+Output* OutputQueue::next(Time t, std::vector<Output>& out) {
+  if (last_ && t <= *last_) return nullptr;
   last_ = t;
-  std::optional<Output> o(std::in_place);
+  Output* const o = &out.emplace_back();
   if (!sweeps_.empty()) {
-    o = std::move(sweeps_.front());
+    *o = std::move(sweeps_.front());
     sweeps_.pop_front();
   }
   if (!images_.empty()) {

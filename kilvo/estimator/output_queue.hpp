@@ -4,6 +4,7 @@
 #include <deque>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "kilvo/estimator/output.hpp"
 
@@ -17,8 +18,8 @@ class OutputQueue {
   bool empty() const { return sweeps_.empty() && images_.empty(); }
   bool has_sweep() const { return !sweeps_.empty(); }
 
-  /// The output of `t`, with the oldest results that wait; none when one of this time has gone out, which has said it all.
-  std::optional<Output> next(Time t);
+  /// Appends the output of `t`, with the oldest results that wait; none when one of this time has gone out, which has said it all.
+  Output* next(Time t, std::vector<Output>& out);
   std::optional<Time> last() const { return last_; }
 
  private:

@@ -100,7 +100,7 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
       interval.gyro_scale *= 1 - sweep_noise_.rotation;
       interval.velocity_scale *= 1 - sweep_noise_.position;
     }
-    e = predict(e, interval, feet, noise);
+    carry(e, interval, feet, noise);
     if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
   };
   // The first sample after e.t.

@@ -1,5 +1,6 @@
 // What a robot does all day: predict, predict, predict, update. Nothing may creep.
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include "kilvo/filter/predict.hpp"
@@ -20,7 +21,7 @@ Rows<6> pose_rows(const State& x, const SE3& measured, double sigma) {
   rows.r.resize(6);
   rows.r << (measured.R.inverse() * x.R).Log(), x.p - measured.p;
   rows.H.setZero(6, at::size);
-  rows.H.block<3, 3>(0, at::R) = right_jacobian_inverse(rows.r.head<3>());
+  rows.H.block<3, 3>(0, at::R) = right_jacobian(rows.r.head<3>()).inverse();
   rows.H.block<3, 3>(3, at::p).setIdentity();
   rows.R = Eigen::Matrix<double, 6, 6>::Identity() * sigma * sigma;
   return rows;

@@ -57,9 +57,9 @@ ForceJacobians jacobians_of(const State& x, const Motion& m) {
 constexpr int moving = 9;  // rows of the error state that an interval moves: R, p, v
 using MovingRows = Eigen::Matrix<double, moving, at::size, Eigen::RowMajor>;
 
-// out = F P F', where F is the identity below its first rows. Each row of F P is a sum of columns of P, which is symmetric.
-void move(const Covariance& P, const MovingRows& F, Covariance& out) {
-  out.rightCols<at::size - moving>() = P.rightCols<at::size - moving>();
+// P becomes F P F', where F is the identity below its first rows. Each row of F P is a sum of columns of P, which is symmetric.
+void move(const MovingRows& F, Covariance& P) {
+  Eigen::Matrix<double, at::size, moving> out;
   times_rows(P, F.data(), moving, out.data());
   std::array<double, static_cast<std::size_t>(moving * moving)> N{};  // F P F' of those rows
   for (int k = 0; k < moving; ++k) {
@@ -69,8 +69,8 @@ void move(const Covariance& P, const MovingRows& F, Covariance& out) {
     }
   }
   for (int k = 0; k < moving; ++k) {
-    for (int i = 0; i <= k; ++i) out(i, k) = out(k, i) = N[static_cast<std::size_t>(k * moving + i)];
-    for (int j = moving; j < at::size; ++j) out(k, j) = out(j, k);
+    for (int i = 0; i <= k; ++i) P(i, k) = P(k, i) = N[static_cast<std::size_t>(k * moving + i)];
+    for (int j = moving; j < at::size; ++j) P(k, j) = P(j, k) = out(j, k);
   }
 }
 
@@ -115,18 +115,14 @@ ImuInterval ImuInterval::between(const ImuSample& a, const ImuSample& b, Time be
 
 State predict_mean(const State& x, const ImuInterval& interval) { return mean_after(x, motion_of(x, interval)); }
 
-Estimate predict(const Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise) {
+void carry(Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise) {
   assert(interval.begin == e.t && interval.end >= interval.begin);
   const Motion m = motion_of(e.x, interval);
   const ForceJacobians j = jacobians_of(e.x, m);
   const double dt = m.dt, dt2 = dt * dt;
 
-  Estimate out;
-  out.t = interval.end;
-  out.x = mean_after(e.x, m);
-
   // F differs from the identity only in the rows of R, p, v.
-  const Eigen::Matrix3d& R0 = e.x.R.matrix();
+  const Eigen::Matrix3d R0 = e.x.R.matrix();
   const Eigen::Matrix3d& R1 = m.R1.matrix();
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
   MovingRows F = MovingRows::Zero();
@@ -146,9 +142,10 @@ Estimate predict(const Estimate& e, const ImuInterval& interval, const FootOrien
   // By the end of the window that the biases are means of, their error has taken back what the noise of the samples did; of gravity and
   // the accelerometer's bias the mean holds the sum.
   if (interval.made_biases) F.middleCols<at::pcl - at::bg>(at::bg).setZero();
-  move(e.P, F, out.P);
-  add_process_noise(out.P, m, -e.x.g.normalized(), feet, noise, interval);
-  return out;
+  move(F, e.P);
+  add_process_noise(e.P, m, -e.x.g.normalized(), feet, noise, interval);
+  e.t = interval.end;
+  e.x = mean_after(e.x, m);
 }
 
 }  // namespace kilvo

@@ -91,7 +91,8 @@ void LegMotionError::learn(const Eigen::Vector3d& up_W) {
 
 PoseCovariance LegMotionError::error(const State& x) const {
   PoseCovariance out = PoseCovariance::Zero();
-  out.bottomRightCorner<3, 3>() = by_legs_ * (P_ + varying * varying * Eigen::Matrix<double, 9, 9>::Identity()) * by_legs_.transpose();
+  if (!by_legs_.isZero(0))
+    out.bottomRightCorner<3, 3>() = by_legs_ * (P_ + varying * varying * Eigen::Matrix<double, 9, 9>::Identity()) * by_legs_.transpose();
   const Eigen::Vector3d up_I = x.R.inverse() * -x.g.normalized();
   Eigen::Matrix<double, 6, 1> by_gyro, by_drift;
   by_gyro << turned_ * up_I, by_gyro_;

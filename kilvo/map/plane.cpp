@@ -52,19 +52,6 @@ double Plane::variance_at(const Eigen::Vector3d& x) const {
   return static_cast<double>(offset_variance + tilt_variance_1 * a * a + tilt_variance_2 * b * b);
 }
 
-Eigen::Matrix3d Plane::normal_covariance() const {
-  const Eigen::Vector3d u = axis.cast<double>(), w = normal.cross(axis).cast<double>();
-  return static_cast<double>(tilt_variance_1) * u * u.transpose() + static_cast<double>(tilt_variance_2) * w * w.transpose();
-}
-
-Eigen::Matrix<double, 6, 6> Plane::covariance() const {
-  const Eigen::Vector3d n = normal.cast<double>();
-  Eigen::Matrix<double, 6, 6> C = Eigen::Matrix<double, 6, 6>::Zero();
-  C.topLeftCorner<3, 3>() = normal_covariance();
-  C.bottomRightCorner<3, 3>() = static_cast<double>(offset_variance) * n * n.transpose();
-  return C;
-}
-
 std::optional<Plane> fit_plane(const Moments& moments, const Eigen::Vector3d& origin, const PlaneConfig& config) {
   const double n = moments.count();
   if (n < config.min_points) return std::nullopt;

@@ -46,10 +46,6 @@ struct Plane {
   double distance(const Eigen::Vector3d& x) const { return normal.cast<double>().dot(x - centre); }
   /// Variance of the plane's own position under x: offset and tilt, m^2.
   double variance_at(const Eigen::Vector3d& x) const;
-  /// Covariance of the normal (3x3, of rank two).
-  Eigen::Matrix3d normal_covariance() const;
-  /// 6x6 covariance of (normal, centre): with the centre at the mean of the points the two are independent.
-  Eigen::Matrix<double, 6, 6> covariance() const;
 };
 
 struct PlaneConfig {

@@ -76,17 +76,4 @@ Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& theta) {
   return Eigen::Matrix3d::Identity() - b * K + c * K * K;
 }
 
-Eigen::Matrix3d right_jacobian_inverse(const Eigen::Vector3d& theta) {
-  const double a2 = theta.squaredNorm();
-  double c;  // 1/a^2 - (1+cos(a))/(2 a sin(a)) = (1 - (a/2) cot(a/2)) / a^2
-  if (a2 < small_angle_squared) {
-    c = 1.0 / 12.0 + a2 / 720.0 + a2 * a2 / 30240.0;
-  } else {
-    const double half = 0.5 * std::sqrt(a2);
-    c = (1.0 - half * std::cos(half) / std::sin(half)) / a2;
-  }
-  const Eigen::Matrix3d K = skew(theta);
-  return Eigen::Matrix3d::Identity() + 0.5 * K + c * K * K;
-}
-
 }  // namespace kilvo

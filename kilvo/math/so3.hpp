@@ -38,7 +38,5 @@ class SO3 {
 
 /// Jr(theta): Exp(theta + d) ~ Exp(theta) Exp(Jr d).
 Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& theta);
-/// Jr(theta)^-1: Log(Exp(theta) Exp(d)) ~ theta + Jr^-1 d.
-Eigen::Matrix3d right_jacobian_inverse(const Eigen::Vector3d& theta);
 
 }  // namespace kilvo

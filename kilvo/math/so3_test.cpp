@@ -29,16 +29,6 @@ Eigen::Matrix3d numeric_right_jacobian(const Eigen::Vector3d& theta) {
   return J;
 }
 
-Eigen::Matrix3d numeric_right_jacobian_inverse(const Eigen::Vector3d& theta) {
-  constexpr double h = 1e-5;
-  Eigen::Matrix3d J;
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d d = h * Eigen::Vector3d::Unit(i);
-    J.col(i) = ((SO3::Exp(theta) * SO3::Exp(d)).Log() - (SO3::Exp(theta) * SO3::Exp(-d)).Log()) / (2 * h);
-  }
-  return J;
-}
-
 TEST(SO3, ExpIsTheRotationAboutItsAxis) {
   test::Random random(1);
   for (const double angle : delicate_angles()) {
@@ -97,27 +87,12 @@ TEST(SO3, RightJacobianIsTheDerivativeOfExp) {
   }
 }
 
-TEST(SO3, RightJacobianInverseIsTheDerivativeOfLog) {
-  test::Random random(6);
-  for (const double angle : delicate_angles()) {
-    for (int i = 0; i < 10; ++i) {
-      const Eigen::Vector3d theta = angle * random.direction();
-      // Closer to pi than the step of the difference, Log jumps.
-      if (angle < pi - 1e-4) {
-        EXPECT_LT((right_jacobian_inverse(theta) - numeric_right_jacobian_inverse(theta)).norm(), 1e-8) << angle;
-      }
-      EXPECT_LT((right_jacobian_inverse(theta) * right_jacobian(theta) - Eigen::Matrix3d::Identity()).norm(), 1e-12) << angle;
-    }
-  }
-}
-
 TEST(SO3, JacobiansDoNotJumpWhereTheSeriesTakesOver) {
   test::Random random(7);
   for (int i = 0; i < 20; ++i) {
     const Eigen::Vector3d axis = random.direction();
     const Eigen::Vector3d below = 0.9999999e-3 * axis, above = 1.0000001e-3 * axis;
     EXPECT_LT((right_jacobian(below) - right_jacobian(above)).norm(), 3e-10);
-    EXPECT_LT((right_jacobian_inverse(below) - right_jacobian_inverse(above)).norm(), 3e-10);
   }
 }
 

@@ -11,6 +11,9 @@ struct Image {
   int height = 0;                    // pixels
   int channels = 1;                  // 1 grey, 3 red-green-blue, interleaved
   std::vector<std::uint8_t> pixels;  // width * height * channels
+  // Of a grey image that has colours beside its greys, as JPEG has them: blue differences, then red ones (Cb, Cr), both over all of it.
+  int chroma_width = 0, chroma_height = 0;
+  std::vector<std::uint8_t> chroma = {};
 
   bool empty() const { return pixels.empty(); }
 };

@@ -44,6 +44,7 @@ struct LidarScan {
 struct CameraImage {
   Time t{};
   Image image;
+  bool colours = true;  // of the points that it shows are wanted
 };
 
 using Measurement = std::variant<ImuSample, JointSample, LidarScan, CameraImage>;

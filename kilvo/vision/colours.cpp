@@ -17,26 +17,43 @@ std::array<std::uint8_t, 256> exposed(double tau) {
   return out;
 }
 
+using Rgb = std::array<std::uint8_t, 3>;
+
+Rgb rgb_of(int y, int blue, int red) {
+  const auto byte = [](double x) { return static_cast<std::uint8_t>(std::clamp(x, 0.0, 255.0) + 0.5); };
+  return {byte(y + 1.402 * red), byte(y - 0.344136 * blue - 0.714136 * red), byte(y + 1.772 * blue)};
+}
+
+Rgb rgb_at(const Image& image, int u, int v) {
+  const auto at = static_cast<std::size_t>(v * image.width + u);
+  const std::uint8_t* value = image.pixels.data() + static_cast<std::size_t>(image.channels) * at;
+  if (image.channels == 3) return {value[0], value[1], value[2]};
+  const auto plane = static_cast<std::size_t>(image.chroma_width * image.chroma_height);
+  if (plane == 0 || image.chroma.size() != 2 * plane) return {*value, *value, *value};
+  const int x = u * image.chroma_width / image.width, y = v * image.chroma_height / image.height;
+  const std::uint8_t* chroma = image.chroma.data() + y * image.chroma_width + x;
+  constexpr int none = 128;
+  return rgb_of(*value, chroma[0] - none, chroma[plane] - none);
+}
+
 }  // namespace
 
 std::vector<ColouredPoint> colours_of(const Image& image, double tau, const Camera& camera, const SE3& T_CW, const DepthView& view) {
   std::vector<ColouredPoint> out;
   out.reserve(view.seen().size());
   const std::array<std::uint8_t, 256> as_first = exposed(tau);
-  const auto channels = static_cast<std::size_t>(image.channels), width = static_cast<std::size_t>(image.width);
   for (const DepthView::Seen& seen : view.seen()) {
     if (!view.shows(seen)) continue;
     const Eigen::Vector3d p_W = view.point(seen), p_C = T_CW * p_W;
     const auto pixel = camera.project(p_C);
     if (!pixel || !camera.sees(*pixel, 0)) continue;
-    const auto u = static_cast<std::size_t>(pixel->x() + 0.5), v = static_cast<std::size_t>(pixel->y() + 0.5);
-    const std::uint8_t* value = image.pixels.data() + channels * (v * width + u);
+    const Rgb rgb = rgb_at(image, static_cast<int>(pixel->x() + 0.5), static_cast<int>(pixel->y() + 0.5));
     ColouredPoint& point = out.emplace_back();
     point.p_W = p_W.cast<float>();
-    for (std::size_t i = 0; i < 3; ++i) point.rgb[i] = as_first[value[channels == 3 ? i : 0]];
+    for (std::size_t i = 0; i < 3; ++i) point.rgb[i] = as_first[rgb[i]];
     const double depth = std::max(p_C.z(), nearest);
     point.weight = static_cast<float>(1 / (depth * depth));  // as the share of the image that it takes
-    if (*std::max_element(value, value + channels) >= overexposed) point.weight *= of_overexposed;
+    if (*std::ranges::max_element(rgb) >= overexposed) point.weight *= of_overexposed;
   }
   return out;
 }

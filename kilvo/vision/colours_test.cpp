@@ -52,6 +52,18 @@ TEST(Colours, AreThoseOfThePixelsThatSeeThePoints) {
   EXPECT_EQ(found[2].rgb, (Rgb{120, 132, 77}));
 }
 
+TEST(Colours, AreThoseBesideTheGreys) {
+  Image image{64, 48, 1, std::vector<std::uint8_t>(64 * 48, 100)};
+  image.chroma_width = 32;
+  image.chroma_height = 24;
+  image.chroma.assign(2 * 32 * 24, 128);
+  image.chroma[32 * 24 + 2 * 32 + 5] = 178;
+  const auto found = colours({seen_at(10, 5, 2), seen_at(40, 30, 3)}, image);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].rgb, (Rgb{170, 64, 100}));
+  EXPECT_EQ(found[1].rgb, (Rgb{100, 100, 100}));
+}
+
 TEST(Colours, AGreyImageGivesGreys) {
   const auto found = colours({seen_at(10, 5, 2)}, drawn(1));
   ASSERT_EQ(found.size(), 1u);

@@ -258,6 +258,7 @@ std::vector<ColouredPoint> VisualPipeline::learn(const VoxelMap& map, const Pose
   map_.forget(posterior.x.p, map_radius_);
   last_p_ = posterior.x.p;
   const std::unique_ptr<Work> done = std::move(work_);
+  if (!work.image.colours) return {};
   return colours_of(work.image.image, posterior.x.tau, camera_, work.T_CI * posterior.x.pose().inverse(), work.depth);
 }
 

@@ -6,14 +6,21 @@
 namespace kilvo::lab {
 
 Eigen::Vector3d log_of(const Eigen::Quaterniond& q) {
-  const double s = q.w() < 0 ? -1 : 1, sine = q.vec().norm();
-  if (sine < 1e-9) return 2 * s * q.vec();
+  const double s = q.w() < 0 ? -1 : 1, square = q.vec().squaredNorm(), r = square / (q.w() * q.w());
+  // The arc tangent's series, exact to rounding.
+  if (r < 1e-3) return 2 * (1 - r * (1.0 / 3 - r * (1.0 / 5 - r * (1.0 / 7 - r / 9)))) / q.w() * q.vec();
+  const double sine = std::sqrt(square);
   return 2 * std::atan2(sine, s * q.w()) / sine * s * q.vec();
 }
 
 Eigen::Quaterniond exp_of(const Eigen::Vector3d& v) {
-  const double a = v.norm();
-  const double k = a < 1e-9 ? 0.5 : std::sin(0.5 * a) / a;
+  const double a2 = v.squaredNorm();
+  // Between two samples of an IMU: the series, exact to rounding.
+  if (a2 < 1e-4) {
+    const double k = 0.5 - a2 / 48 + a2 * a2 / 3840;
+    return {1 - a2 / 8 + a2 * a2 / 384, k * v.x(), k * v.y(), k * v.z()};
+  }
+  const double a = std::sqrt(a2), k = std::sin(0.5 * a) / a;
   return {std::cos(0.5 * a), k * v.x(), k * v.y(), k * v.z()};
 }
 

@@ -40,10 +40,10 @@ inline std::uint64_t home_of(std::uint64_t key) { return key * 0x9E3779B97F4A7C1
 
 PlaneGrid::PlaneGrid(double side) : side_(side), slots_(first_slots) {}
 
-// Where the voxel of this key is, or would be.
-std::size_t PlaneGrid::slot_of(std::uint64_t key) const {
+// Where the voxel of this key is, or would be; it is known not to be between its home and `from`.
+std::size_t PlaneGrid::slot_of(std::uint64_t key, std::size_t from) const {
   const std::size_t mask = slots_.size() - 1;
-  std::size_t i = home_of(key) & mask;
+  std::size_t i = from & mask;
   while (slots_[i].voxel != none && slots_[i].key != key) i = (i + 1) & mask;
   return i;
 }
@@ -52,12 +52,12 @@ void PlaneGrid::grow() {
   std::vector<Slot> old(2 * slots_.size());
   old.swap(slots_);
   for (const Slot& slot : old) {
-    if (slot.voxel != none) slots_[slot_of(slot.key)] = slot;
+    if (slot.voxel != none) slots_[slot_of(slot.key, home_of(slot.key))] = slot;
   }
 }
 
-PlaneGrid::Voxel& PlaneGrid::voxel_of(std::uint64_t key) {
-  Slot& slot = slots_[slot_of(key)];
+PlaneGrid::Voxel& PlaneGrid::voxel_of(std::uint64_t key, std::size_t from) {
+  Slot& slot = slots_[slot_of(key, from)];
   if (slot.voxel != none) return voxels_[slot.voxel];
   slot = {key, static_cast<std::uint32_t>(voxels_.size())};
   Voxel& voxel = voxels_.emplace_back();
@@ -69,6 +69,7 @@ void PlaneGrid::insert(std::span<const Eigen::Vector3d> points) {
   // So many wait for memory at once.
   constexpr std::size_t together = 16;
   std::array<Cell, together> cells;
+  std::array<std::size_t, together> at;
   for (std::size_t first = 0; first < points.size(); first += together) {
     const auto some = points.subspan(first, std::min(together, points.size() - first));
     for (std::size_t i = 0; i < some.size(); ++i) {
@@ -76,13 +77,15 @@ void PlaneGrid::insert(std::span<const Eigen::Vector3d> points) {
       __builtin_prefetch(&slots_[home_of(cells[i].key) & (slots_.size() - 1)]);
     }
     for (std::size_t i = 0; i < some.size(); ++i) {
-      const Slot& slot = slots_[slot_of(cells[i].key)];
+      at[i] = slot_of(cells[i].key, home_of(cells[i].key));
+      const Slot& slot = slots_[at[i]];
       if (slot.voxel == none) continue;
       const char* const voxel = reinterpret_cast<const char*>(&voxels_[slot.voxel]);
       for (std::size_t line = 0; line < sizeof(Voxel); line += 64) __builtin_prefetch(voxel + line);
     }
+    const std::size_t size = slots_.size();
     for (std::size_t i = 0; i < some.size(); ++i) {
-      Voxel& v = voxel_of(cells[i].key);
+      Voxel& v = voxel_of(cells[i].key, slots_.size() == size ? at[i] : home_of(cells[i].key));
       if (v.n >= most) continue;
       // About the voxel's corner, so that squares stay small.
       const Eigen::Vector3d d = some[i] - side_ * cells[i].at;
@@ -105,7 +108,7 @@ void PlaneGrid::fit(Voxel& v, const Eigen::Vector3d& corner) const {
 
 const GridPlane* PlaneGrid::find(const Eigen::Vector3d& p) {
   const Cell cell = cell_of(p, side_);
-  const Slot& slot = slots_[slot_of(cell.key)];
+  const Slot& slot = slots_[slot_of(cell.key, home_of(cell.key))];
   if (slot.voxel == none) return nullptr;
   Voxel& v = voxels_[slot.voxel];
   if (v.n < fewest_points) return nullptr;

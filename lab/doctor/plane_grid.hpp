@@ -34,8 +34,8 @@ class PlaneGrid {
     std::uint64_t key = 0;
     std::uint32_t voxel = none;
   };
-  std::size_t slot_of(std::uint64_t key) const;
-  Voxel& voxel_of(std::uint64_t key);
+  std::size_t slot_of(std::uint64_t key, std::size_t from) const;
+  Voxel& voxel_of(std::uint64_t key, std::size_t from);
   void grow();
   void fit(Voxel& voxel, const Eigen::Vector3d& corner) const;
 

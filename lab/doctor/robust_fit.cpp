@@ -33,10 +33,11 @@ std::vector<Normal> sum_up(const Residuals& at, const std::vector<Residuals>& mo
     const double weight = 1 / (1 + squared_length(at, k) / (static_cast<double>(width) * 4 * scale * scale));
     for (std::size_t i = k * width; i < (k + 1) * width; ++i) {
       for (Eigen::Index j = 0; j < n; ++j) J[j] = (moved[static_cast<std::size_t>(j)].r[i] - at.r[i]) / step[j];
-      out.back().H += weight * J * J.transpose();
+      out.back().H.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
       out.back().g += weight * at.r[i] * J;
     }
   }
+  for (Normal& block : out) block.H.triangularView<Eigen::StrictlyUpper>() = block.H.transpose();
   return out;
 }
 

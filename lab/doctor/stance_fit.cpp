@@ -97,6 +97,7 @@ class Stances {
 
   /// Where the soles seem to stand with these values.
   void find(const Eigen::VectorXd& x, bool first) {
+    place(x);
     stances_.clear();
     const double slow = still[first ? 0 : 1], slow_turn = still_turn[first ? 0 : 1];
     for (std::size_t f = 0; f < 2; ++f) {
@@ -118,7 +119,8 @@ class Stances {
   }
 
   /// Each sample of a stance against the mean of its middle half.
-  void rows(const Eigen::VectorXd& x, Residuals& out) const {
+  void rows(const Eigen::VectorXd& x, Residuals& out) {
+    place(x);
     out.width = 6;
     std::vector<SE3> soles;
     for (std::size_t k = 0; k < stances_.size(); ++k) {
@@ -173,15 +175,25 @@ class Stances {
     }
   }
 
+  // Where the IMU was at each sample, which of all unknowns the clock alone changes.
+  void place(const Eigen::VectorXd& x) {
+    T_IL_ = SE3{rotation(x), T_LI_.p + x.segment<3>(of_p)}.inverse();
+    const double offset = offset_ + std::clamp(x[of_offset], -stance_slack, stance_slack);
+    if (offset == placed_by_) return;
+    placed_by_ = offset;
+    T_WI_.clear();
+    for (const Sample& s : samples_) T_WI_.push_back(way_.at(s.t + offset, gyro_));
+  }
+
+  // After place() with the same values.
   std::optional<SE3> sole_at(const Eigen::VectorXd& x, std::size_t i, std::size_t f) const {
-    const auto T_WI = way_.at(samples_[i].t + offset_ + std::clamp(x[of_offset], -stance_slack, stance_slack), gyro_);
+    const std::optional<SE3>& T_WI = T_WI_[i];
     if (!T_WI) return std::nullopt;
-    const SE3 T_LI{rotation(x), T_LI_.p + x.segment<3>(of_p)};
     const Sole& sole = samples_[i].sole[f];
-    if (joints_.empty()) return *T_WI * T_LI.inverse() * SE3{sole.R, (1 + x[of_scale]) * sole.c};
+    if (joints_.empty()) return *T_WI * T_IL_ * SE3{sole.R, (1 + x[of_scale]) * sole.c};
     const auto zeros = x.tail(x.size() - of_zeros);
     const SE3 in_link{sole.R * SO3::Exp(sole.by_R * zeros), (1 + x[of_scale]) * (sole.c + sole.by_c * zeros)};
-    return *T_WI * T_LI.inverse() * in_link;
+    return *T_WI * T_IL_ * in_link;
   }
 
   const LidarWay& way_;
@@ -190,6 +202,9 @@ class Stances {
   double offset_;
   std::vector<std::size_t> joints_;
   std::vector<Sample> samples_;
+  SE3 T_IL_;                              // with the values of place()
+  std::vector<std::optional<SE3>> T_WI_;  // of the samples, with this clock:
+  std::optional<double> placed_by_;
   std::vector<Stance> stances_;
 };
 

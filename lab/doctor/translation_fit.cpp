@@ -154,7 +154,7 @@ std::optional<TranslationRows::Solution> TranslationRows::solve(const Equations&
       lengths.push_back(e.squaredNorm());
       const double weight = 1 / (1 + e.squaredNorm() / (12 * s2));
       if (i > 0 && static_cast<int>(rows_[i - 1].t / block_seconds) != static_cast<int>(rows_[i].t / block_seconds)) blocks.emplace_back(n);
-      blocks.back().H += weight * of.J[i].transpose() * of.J[i];
+      blocks.back().H += weight * of.J[i].transpose().lazyProduct(of.J[i]);
       blocks.back().g += weight * of.J[i].transpose() * e;
       g += weight * of.J[i].transpose() * of.y[i];
     }

@@ -40,13 +40,13 @@ std::optional<int> take_exponent(std::string_view& s) {
   return negative ? -exponent : exponent;
 }
 
-/// "seconds.nnnnnnnnn" of a number of billionths.
-void append_billionths(std::string& out, std::int64_t n) {
+/// A number of units of the last of so many decimals.
+void append_decimals(std::string& out, std::int64_t n, int decimals) {
   char buffer[32];
   char* p = buffer + sizeof(buffer);
   auto rest = n < 0 ? std::uint64_t{0} - static_cast<std::uint64_t>(n) : static_cast<std::uint64_t>(n);
-  for (int i = 0; i < 10 || rest > 0; ++i) {
-    if (i == 9) *--p = '.';
+  for (int i = 0; i <= decimals || rest > 0; ++i) {
+    if (i == decimals) *--p = '.';
     *--p = static_cast<char>('0' + rest % 10);
     rest /= 10;
   }
@@ -79,12 +79,23 @@ std::optional<Time> parse_seconds(std::string_view s) {
   return time_from_ns(negative ? -ns : ns);
 }
 
-void append_seconds(std::string& out, Time t) { append_billionths(out, to_ns(t)); }
+void append_seconds(std::string& out, Time t) { append_decimals(out, to_ns(t), 9); }
 
 void append_fixed9(std::string& out, double x) {
-  if (std::abs(x) < 9e9) return append_billionths(out, std::llround(x * 1e9));
+  if (std::abs(x) < 9e9) return append_decimals(out, std::llround(x * 1e9), 9);
   char buffer[352];  // the largest double has 309 digits before the point
   out.append(buffer, static_cast<std::size_t>(std::snprintf(buffer, sizeof(buffer), "%.9f", x)));
+}
+
+void append_fixed(std::string& out, double x, int decimals) {
+  constexpr double powers[] = {1, 1e1, 1e2, 1e3, 1e4, 1e5};
+  if (std::abs(x) < 9e9) {
+    const std::int64_t n = std::llrint(x * powers[decimals]);
+    if (n == 0 && std::signbit(x)) out += '-';
+    return append_decimals(out, n, decimals);
+  }
+  char buffer[352];
+  out.append(buffer, static_cast<std::size_t>(std::snprintf(buffer, sizeof(buffer), "%.*f", decimals, x)));
 }
 
 }  // namespace kilvo::lab

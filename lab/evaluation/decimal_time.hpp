@@ -19,4 +19,7 @@ void append_seconds(std::string& out, Time t);
 /// Appends `x` with 9 decimals, as printf("%.9f") does but about ten times faster and never as "-0.000000000".
 void append_fixed9(std::string& out, double x);
 
+/// The same with 1 to 5 decimals, and a sign before a zero as printf() has it.
+void append_fixed(std::string& out, double x, int decimals);
+
 }  // namespace kilvo::lab

@@ -92,5 +92,19 @@ TEST(DecimalTime, FixedNumbersAreThoseOfPrintfWithoutNegativeZero) {
   EXPECT_EQ(fixed9(std::numeric_limits<double>::quiet_NaN()).find("nan"), fixed9(std::numeric_limits<double>::quiet_NaN()).size() - 3);
 }
 
+TEST(AppendFixed, WritesWhatPrintfWrites) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> size(-9, 9), sign(-1, 1);
+  const auto expect_same = [](double x, int decimals) {
+    char expected[400];
+    std::snprintf(expected, sizeof expected, "%.*f", decimals, x);
+    std::string text;
+    append_fixed(text, x, decimals);
+    EXPECT_EQ(text, expected);
+  };
+  for (int i = 0; i < 20000; ++i) expect_same(sign(random) * std::pow(10, size(random)), 1 + i % 5);
+  for (const double x : {0.0, -0.0, -1e-7, 0.0625, 0.1875, 2.5, 1e10, -1e300}) expect_same(x, 3);
+}
+
 }  // namespace
 }  // namespace kilvo::lab

@@ -80,6 +80,7 @@ struct MapBuilder::Block {
   std::array<Voxel, block_size> samples;
   std::array<std::uint64_t, block_size> hashes;
   std::array<std::uint32_t, block_size> from;  // of which point
+  std::array<std::size_t, block_size> places;  // in their tables: the voxel is there or farther on, unless the table grows
 };
 
 void MapBuilder::add(std::span<const Eigen::Vector4f> points_W) {
@@ -88,7 +89,11 @@ void MapBuilder::add(std::span<const Eigen::Vector4f> points_W) {
   for (std::size_t begin = 0; begin < points_W.size(); begin += block_size) {
     const std::size_t size = std::min(block_size, points_W.size() - begin), count = locate(&points_W[begin], size, block);
     prefetch(block, count);
-    for (std::size_t i = 0; i < count; ++i) merge(block.samples[i], block.hashes[i]);
+    const std::size_t grown = grown_;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Table& table = tables_[block.hashes[i] % table_count];
+      merge(block.samples[i], block.hashes[i], grown_ == grown ? block.places[i] : block.hashes[i] >> table.shift);
+    }
     dropped_ += size - count;
   }
 }
@@ -118,28 +123,29 @@ std::size_t MapBuilder::locate(const Eigen::Vector4f* points_W, std::size_t coun
 }
 
 /// Asks for the voxels that the tables seem to have for these.
-void MapBuilder::prefetch(const Block& block, std::size_t count) const {
+void MapBuilder::prefetch(Block& block, std::size_t count) const {
   for (std::size_t i = 0; i < count; ++i) {
     const Table& table = tables_[block.hashes[i] % table_count];
     const std::uint32_t tag = tag_of(block.hashes[i]);
     std::size_t place = block.hashes[i] >> table.shift;
     while (table.slots[place] != 0 && (table.slots[place] & ~number_mask()) != tag) place = (place + 1) & (table.slots.size() - 1);
     if (table.slots[place] != 0) __builtin_prefetch(&voxel((table.slots[place] & number_mask()) - 1));
+    block.places[i] = place;
   }
 }
 
-/// Where the table has the voxel of this key, or is empty when it has none.
-std::size_t MapBuilder::slot_of(const Table& table, std::uint64_t key, std::uint64_t hashed) const {
+/// Where the table has the voxel of this key, or is empty when it has none; `place`: not before.
+std::size_t MapBuilder::slot_of(const Table& table, std::uint64_t key, std::uint64_t hashed, std::size_t place) const {
   const std::uint32_t tag = tag_of(hashed);
-  for (std::size_t place = hashed >> table.shift;; place = (place + 1) & (table.slots.size() - 1)) {
+  for (;; place = (place + 1) & (table.slots.size() - 1)) {
     const std::uint32_t slot = table.slots[place];
     if (slot == 0 || ((slot & ~number_mask()) == tag && voxel((slot & number_mask()) - 1).key == key)) return place;
   }
 }
 
-void MapBuilder::merge(const Voxel& sample, std::uint64_t hashed) {
+void MapBuilder::merge(const Voxel& sample, std::uint64_t hashed, std::size_t from) {
   Table& table = tables_[hashed % table_count];
-  const std::size_t place = slot_of(table, sample.key, hashed);
+  const std::size_t place = slot_of(table, sample.key, hashed, from);
   if (table.slots[place] != 0) {
     Voxel& known = voxel((table.slots[place] & number_mask()) - 1);
     if (known.count == most_averaged) return;
@@ -170,7 +176,7 @@ void MapBuilder::colour(std::span<const ColouredPoint> points) {
       const ColouredPoint& point = some[block.from[i]];
       if (!(point.weight > 0)) continue;
       const Table& table = tables_[block.hashes[i] % table_count];
-      const std::uint32_t slot = table.slots[slot_of(table, block.samples[i].key, block.hashes[i])];
+      const std::uint32_t slot = table.slots[slot_of(table, block.samples[i].key, block.hashes[i], block.places[i])];
       if (slot != 0) mix(point, colour_at((slot & number_mask()) - 1));
     }
   }
@@ -191,6 +197,7 @@ void MapBuilder::append(const Voxel& sample) {
 }
 
 void MapBuilder::grow(Table& table) {
+  ++grown_;
   const std::vector<std::uint32_t> old = std::move(table.slots);
   const std::size_t slots = std::max(first_slots, 2 * old.size());
   table.slots.assign(slots, 0);

@@ -90,11 +90,11 @@ class MapBuilder {
   /// Points on their way, so many at a time that their cache misses overlap.
   struct Block;
   std::size_t locate(const Eigen::Vector4f* points_W, std::size_t count, Block& block) const;
-  void prefetch(const Block& block, std::size_t count) const;
+  void prefetch(Block& block, std::size_t count) const;
   std::uint32_t tag_of(std::uint64_t hashed) const { return static_cast<std::uint32_t>(hashed >> 8U << number_bits_); }
   std::uint32_t number_mask() const { return (std::uint32_t{1} << number_bits_) - 1; }
-  std::size_t slot_of(const Table& table, std::uint64_t key, std::uint64_t hashed) const;
-  void merge(const Voxel& sample, std::uint64_t hashed);
+  std::size_t slot_of(const Table& table, std::uint64_t key, std::uint64_t hashed, std::size_t place) const;
+  void merge(const Voxel& sample, std::uint64_t hashed, std::size_t from);
   void mix(const ColouredPoint& point, Colour& known);
   void append(const Voxel& sample);
   void grow(Table& table);
@@ -105,7 +105,8 @@ class MapBuilder {
   double resolution_;
   bool keep_;
   std::size_t max_points_;
-  unsigned number_bits_;  // of a slot
+  unsigned number_bits_;   // of a slot
+  std::size_t grown_ = 0;  // how many times a table grew
   std::size_t size_ = 0;
   std::size_t coloured_ = 0;
   std::uint64_t dropped_ = 0, left_out_ = 0;

@@ -57,7 +57,7 @@ Decoded<Image> finish_png(png_image& png) {
 
 }  // namespace
 
-Decoded<Image> decode_jpeg(Bytes file) {
+Decoded<Image> decode_jpeg(Bytes file, bool with_colours) {
   const std::unique_ptr<void, decltype(&tjDestroy)> decoder(tjInitDecompress(), &tjDestroy);
   if (!decoder) return DecodeError{"JPEG: no decoder"};
   int width = 0, height = 0, subsampling = 0, colours = 0;
@@ -68,13 +68,25 @@ Decoded<Image> decode_jpeg(Bytes file) {
   if (width <= 0 || height <= 0 || too_large(static_cast<std::size_t>(width), static_cast<std::size_t>(height))) {
     return size_error("JPEG", static_cast<std::size_t>(width), static_cast<std::size_t>(height));
   }
-  const bool grey = colours == TJCS_GRAY;
+  // The greys are in the file: of colours, which take as long as half of them, only the planes are read, and only where they are wanted.
+  const bool planes =
+      colours == TJCS_YCbCr && tjPlaneWidth(0, width, subsampling) == width && tjPlaneHeight(0, height, subsampling) == height;
+  const bool grey = planes || colours == TJCS_GRAY;
   Image image = blank(static_cast<std::size_t>(width), static_cast<std::size_t>(height), grey);
   // A warning means that the data ended early or did not make sense: the rest of the picture would be grey.
   const int flags = TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS;
-  if (tjDecompress2(decoder.get(), file.data(), size, image.pixels.data(), width, 0, height, grey ? TJPF_GRAY : TJPF_RGB, flags) != 0) {
-    return DecodeError{std::string("JPEG: ") + tjGetErrorStr2(decoder.get())};
+  int failed = 0;
+  if (planes && with_colours) {
+    image.chroma_width = tjPlaneWidth(1, width, subsampling);
+    image.chroma_height = tjPlaneHeight(1, height, subsampling);
+    const auto plane = static_cast<std::size_t>(image.chroma_width) * static_cast<std::size_t>(image.chroma_height);
+    image.chroma.resize(2 * plane);
+    std::array<unsigned char*, 3> into{image.pixels.data(), image.chroma.data(), image.chroma.data() + plane};
+    failed = tjDecompressToYUVPlanes(decoder.get(), file.data(), size, into.data(), width, nullptr, height, flags);
+  } else {
+    failed = tjDecompress2(decoder.get(), file.data(), size, image.pixels.data(), width, 0, height, grey ? TJPF_GRAY : TJPF_RGB, flags);
   }
+  if (failed != 0) return DecodeError{std::string("JPEG: ") + tjGetErrorStr2(decoder.get())};
   return image;
 }
 
@@ -87,7 +99,7 @@ Decoded<Image> decode_png(Bytes file) {
   return image;
 }
 
-Decoded<CameraImage> decode_compressed_image(const WireMessage& message) {
+Decoded<CameraImage> decode_compressed_image(const WireMessage& message, bool with_colours) {
   constexpr std::array<std::uint8_t, 3> jpeg_magic{0xFF, 0xD8, 0xFF};
   constexpr std::array<std::uint8_t, 8> png_magic{0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
   const auto m = read_message<CompressedImageMessage>(message);
@@ -97,7 +109,7 @@ Decoded<CameraImage> decode_compressed_image(const WireMessage& message) {
   if (!jpeg && !begins_with(file, png_magic)) {
     return DecodeError{"sensor_msgs/CompressedImage: neither JPEG nor PNG (format " + std::string(m->format.substr(0, 40)) + ")"};
   }
-  auto image = jpeg ? decode_jpeg(file) : decode_png(file);
+  auto image = jpeg ? decode_jpeg(file, with_colours) : decode_png(file);
   if (!image) return DecodeError{image.reason()};
   CameraImage decoded;
   decoded.t = m->header.stamp;

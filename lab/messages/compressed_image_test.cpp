@@ -73,9 +73,32 @@ void expect_image(const Decoded<CameraImage>& decoded, int channels, int toleran
   for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(decoded->image.pixels[i], expected[i], tolerance) << i;
 }
 
+/// The greys of the gradient in colour, and how far its blue and its red differ from them.
+void expect_planes(const Decoded<CameraImage>& decoded) {
+  ASSERT_TRUE(decoded) << decoded.reason();
+  const Image& image = decoded->image;
+  ASSERT_EQ(image.channels, 1);
+  ASSERT_EQ(image.pixels.size(), static_cast<std::size_t>(width * height));
+  ASSERT_EQ(image.chroma_width, width);
+  ASSERT_EQ(image.chroma_height, height);
+  ASSERT_EQ(image.chroma.size(), static_cast<std::size_t>(2 * width * height));
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    ASSERT_NEAR(image.pixels[i], 40 + 4 * static_cast<int>(i % width) + 5.55, 4) << i;
+    ASSERT_NEAR(image.chroma[i], 108, 4) << i;
+    ASSERT_NEAR(image.chroma[image.pixels.size() + i], 145, 4) << i;
+  }
+}
+
 TEST(DecodeCompressedImage, ReadsJpegInColourAndGrey) {
-  expect_image(decode_compressed_image(message(jpeg(3))), 3, 4);
+  expect_planes(decode_compressed_image(message(jpeg(3))));
   expect_image(decode_compressed_image(message(jpeg(1))), 1, 4);
+}
+
+TEST(DecodeCompressedImage, GreysAreTheSameWithoutColours) {
+  const auto with = decode_compressed_image(message(jpeg(3))), without = decode_compressed_image(message(jpeg(3)), false);
+  ASSERT_TRUE(with && without);
+  EXPECT_EQ(with->image.pixels, without->image.pixels);
+  EXPECT_TRUE(without->image.chroma.empty());
 }
 
 TEST(DecodeCompressedImage, ReadsPngInColourAndGrey) {
@@ -97,7 +120,7 @@ TEST(DecodeCompressedImage, DropsTheAlphaOfOpaquePixels) {
 }
 
 TEST(DecodeCompressedImage, TheFormatTextMayLie) {
-  expect_image(decode_compressed_image(message(jpeg(3), "bgr8; png compressed bgr8")), 3, 4);
+  expect_planes(decode_compressed_image(message(jpeg(3), "bgr8; png compressed bgr8")));
   expect_image(decode_compressed_image(message(png(gradient(1).data(), PNG_FORMAT_GRAY), "jpeg")), 1, 0);
 }
 

@@ -59,7 +59,7 @@ std::vector<Sensor> sensors_of_type(std::string_view type) {
 }
 
 Decoded<DecodedMeasurement> decode_measurement(Sensor sensor, std::string_view type, const WireMessage& message,
-                                               const PointTimeFormat& point_time) {
+                                               const PointTimeFormat& point_time, bool with_colours) {
   if (!is_type_of(sensor, type)) return DecodeError{std::string(type) + " is not read for the sensor " + name_of(sensor)};
   if (type == hg_low_state) return part(sensor, decode_hg_low_state(message));
   if (type == go_low_state) return part(sensor, decode_go_low_state(message));
@@ -73,7 +73,9 @@ Decoded<DecodedMeasurement> decode_measurement(Sensor sensor, std::string_view t
     case Sensor::camera:
       break;
   }
-  return plain(type == "sensor_msgs/Image" ? decode_image(message) : decode_compressed_image(message));
+  auto image = type == "sensor_msgs/Image" ? decode_image(message) : decode_compressed_image(message, with_colours);
+  if (image) image->colours = with_colours;
+  return plain(std::move(image));
 }
 
 Decoded<CloudTimes> observe_cloud(std::string_view type, const WireMessage& message) {

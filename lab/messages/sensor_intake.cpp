@@ -13,7 +13,7 @@ Time& stamp_in(Measurement& measurement) {
 
 std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view type, const WireMessage& message, Time arrived,
                                               const PointTimeFormat& point_time) {
-  auto decoded = decode_measurement(sensor, type, message, point_time);
+  auto decoded = decode_measurement(sensor, type, message, point_time, with_colours_);
   if (!decoded) {
     if (first_fault_.empty()) first_fault_ = decoded.reason();
     ++counts_.dropped["undecodable"];

@@ -23,8 +23,8 @@ struct SensorCounts {
 
 class SensorIntake {
  public:
-  /// `time_offset`: s, added to the stamps (of a scan: to the time that its points count from).
-  explicit SensorIntake(double time_offset = 0) : time_offset_(time_offset) {}
+  /// `time_offset`: s, added to the stamps (of a scan: to the time that its points count from). `with_colours`: images are to give them.
+  explicit SensorIntake(double time_offset = 0, bool with_colours = true) : time_offset_(time_offset), with_colours_(with_colours) {}
 
   /// `arrived`: when the message was recorded, or received. `point_time` matters for LiDAR types only.
   /// `type` is a plain_type_name() that is_type_of() the sensor.
@@ -50,6 +50,7 @@ class SensorIntake {
 
  private:
   double time_offset_;
+  bool with_colours_;
   SensorCounts counts_;
   std::string first_fault_;
   std::optional<std::uint32_t> tick_;

@@ -30,7 +30,8 @@ std::string detail_of(const JointSample& sample) {
 std::string detail_of(const LidarScan&) { return {}; }
 
 std::string detail_of(const CameraImage& image) {
-  return std::to_string(image.image.width) + "x" + std::to_string(image.image.height) + (image.image.channels == 1 ? " grey" : " colour");
+  const bool grey = image.image.channels == 1 && image.image.chroma.empty();
+  return std::to_string(image.image.width) + "x" + std::to_string(image.image.height) + (grey ? " grey" : " colour");
 }
 
 std::string point_time_of(RecordingReader& reader, const TopicDescription& topic) {

@@ -38,7 +38,7 @@ RecordingSource::RecordingSource(const std::vector<std::filesystem::path>& input
   for (int i = 0; i < sensor_count; ++i) {
     const auto sensor = static_cast<Sensor>(i);
     if (!options_[sensor].use) continue;
-    intakes_[static_cast<std::size_t>(i)] = SensorIntake(options_[sensor].time_offset);
+    intakes_[static_cast<std::size_t>(i)] = SensorIntake(options_[sensor].time_offset, options_.with_colours);
     try {
       chosen_[static_cast<std::size_t>(i)] = choose_topic(reader_->connections(), sensor, options_[sensor].topic);
     } catch (const InputError& error) {

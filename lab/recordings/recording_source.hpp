@@ -29,6 +29,7 @@ struct SensorInput {
 struct RecordingOptions {
   std::array<SensorInput, sensor_count> sensors;
   bool no_deskew = false;                                     // take every cloud at its stamp; needs no point times
+  bool with_colours = true;                                   // images are to give colours to the points that they show
   double start = 0;                                           // s from the beginning of the recording
   double duration = std::numeric_limits<double>::infinity();  // s
 

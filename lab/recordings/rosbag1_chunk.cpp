@@ -83,8 +83,8 @@ std::optional<MessageEntry> BagChunkReader::scan(const std::function<void(const 
 
 std::optional<Bytes> BagChunkReader::message(const MessageEntry& entry) {
   if (is_compressed(chunk_) || entry.size <= window_bytes) return view(entry.offset, entry.size);
-  large_.resize(entry.size);
-  return Bytes(large_).first(file_->read_at(chunk_.data_offset + entry.offset, large_));
+  if (entry.size > large_.size()) large_.resize(entry.size);
+  return Bytes(large_).first(file_->read_at(chunk_.data_offset + entry.offset, std::span(large_).first(entry.size)));
 }
 
 }  // namespace kilvo::lab
