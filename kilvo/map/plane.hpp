@@ -46,19 +46,10 @@ struct Plane {
   double distance(const Eigen::Vector3d& x) const { return normal.cast<double>().dot(x - centre); }
   /// Variance of the plane's own position under x: offset and tilt, m^2.
   double variance_at(const Eigen::Vector3d& x) const;
-  /// Covariance of the normal (3x3, of rank two).
-  Eigen::Matrix3d normal_covariance() const;
-  /// 6x6 covariance of (normal, centre): with the centre at the mean of the points the two are independent.
-  Eigen::Matrix<double, 6, 6> covariance() const;
 };
 
-struct PlaneConfig {
-  double min_points = 8;        // fewer never make a plane
-  double max_roughness = 0.01;  // m; standard deviation beyond the measurement noise above which a surface is no plane
-};
-
-/// The plane through points with these moments around `origin`, if they lie on one: their thickness is what measurement noise and
-/// max_roughness explain, and their extent in both other directions is well above it.
-std::optional<Plane> fit_plane(const Moments& moments, const Eigen::Vector3d& origin, const PlaneConfig& config);
+/// The plane through points with these moments around `origin`, if they are enough and lie on one: their thickness is what measurement
+/// noise and `max_roughness` (m) explain, and their extent in both other directions is well above it.
+std::optional<Plane> fit_plane(const Moments& moments, const Eigen::Vector3d& origin, double min_points, double max_roughness);
 
 }  // namespace kilvo
