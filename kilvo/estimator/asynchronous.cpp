@@ -100,7 +100,7 @@ void Estimator::lose_imu(std::vector<Output>& out) {
 void Estimator::lose_legs(Time t) {
   history_.end_stances(t);
   legs_.restart();
-  status_.lose_legs(findings_.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0);
+  status_.lose_legs(findings_.statistics().sensors[index_of(Sensor::legs)].used > 0);
 }
 
 }  // namespace kilvo

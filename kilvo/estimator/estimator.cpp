@@ -6,7 +6,6 @@
 
 #include "kilvo/estimator/live_propagator.hpp"
 #include "kilvo/filter/gap.hpp"
-#include "kilvo/filter/plausible.hpp"
 
 namespace kilvo {
 

@@ -98,7 +98,7 @@ TEST(Estimator, BegunOnTheMoveTheSweepsHoldIt) {
   const Replay r = run(small_room(), {}, 1, imu_and_lidar, config);
   expect_sane(r);
   EXPECT_LT(r.worst_position, 0.15) << "the first of them has to find the velocity: without them it is metres";
-  EXPECT_GE(r.statistics.sensors[static_cast<std::size_t>(Sensor::lidar)].used, 40u);
+  EXPECT_GE(r.statistics.sensors[index_of(Sensor::lidar)].used, 40u);
 }
 
 TEST(Estimator, FollowsARoomWithinMillimetresAtImuRate) {

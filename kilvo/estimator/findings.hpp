@@ -70,7 +70,7 @@ class Findings {
     std::array<std::array<std::uint64_t, reason_count>, sensor_count> dropped{};
     std::uint64_t unsupported = 0;
   };
-  SensorCount& of(Sensor s) { return statistics_.sensors[static_cast<std::size_t>(s)]; }
+  SensorCount& of(Sensor s) { return statistics_.sensors[index_of(s)]; }
   void report_streams(const Situation& now);
   void report_use(const Use& before, const Situation& now);
   void look_at_agreement(Time t, const Situation& now);

@@ -95,7 +95,6 @@ void History::inflate_velocity(double sigma) {
 }
 
 double History::roll_back() {
-  constexpr double absurd_speed = 30;  // m/s
   // Where the robot went since, nobody knows: about as far as it was going.
   const Time t = std::max(now_.t, good_.t);
   const double lost = to_seconds(t - good_.t);

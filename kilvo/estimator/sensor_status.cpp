@@ -19,12 +19,12 @@ void SensorStatus::begin(Time t, bool legs) {
 void SensorStatus::sweep_used(Time end) {
   last_sweep_ = end;
   sweeps_were_there_ = true;
-  frames_wait_[static_cast<std::size_t>(Sensor::lidar)].reset();
+  frames_wait_[index_of(Sensor::lidar)].reset();
 }
 
 void SensorStatus::image_used(Time t) {
   last_image_ = t;
-  frames_wait_[static_cast<std::size_t>(Sensor::camera)].reset();
+  frames_wait_[index_of(Sensor::camera)].reset();
 }
 
 bool SensorStatus::is_missing(Sensor s) const {
@@ -32,7 +32,7 @@ bool SensorStatus::is_missing(Sensor s) const {
 }
 
 bool SensorStatus::has_waited_less(Sensor s, Time t, Duration longest) {
-  std::optional<Time>& since = frames_wait_[static_cast<std::size_t>(s)];
+  std::optional<Time>& since = frames_wait_[index_of(s)];
   if (!since) since = t;
   return t - *since < longest;
 }

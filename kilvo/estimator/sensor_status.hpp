@@ -61,7 +61,7 @@ class SensorStatus {
 
  private:
   Reason cause_of_change(Time t, Modality now, const Health& health) const;
-  double rate_of(Sensor s) const { return rates_[static_cast<std::size_t>(s)]; }
+  double rate_of(Sensor s) const { return rates_[index_of(s)]; }
 
   std::array<double, sensor_count> rates_;  // Hz, by Sensor
   bool with_lidar_;

@@ -4,13 +4,15 @@
 #include <cmath>
 #include <utility>
 
+#include "kilvo/input/timeline.hpp"
+
 namespace kilvo {
 namespace {
 
 // What goes back by less has come late.
 constexpr Duration least_step = std::chrono::milliseconds(15);
-// So many samples in a row show that the time stays where it went; fewer, when so many messages of the others say so too.
-constexpr int witnesses = 10, few_witnesses = 3, votes = 3;
+// So many samples in a row show that the time stays where it went, when so many messages of the others say so too.
+constexpr int few_witnesses = 3, votes = 3;
 // Beyond, the robot need not be where it was: nothing is remembered for so long.
 constexpr Duration longest_step = std::chrono::seconds(2);
 // Samples that follow each other are no farther apart.
@@ -28,7 +30,7 @@ double distance(Duration a, Duration b) { return std::abs(to_seconds(a) - to_sec
 }  // namespace
 
 std::optional<Reason> ClockSteps::follow_imu(Time t) {
-  Duration& offset = offset_[static_cast<std::size_t>(Sensor::imu)];
+  Duration& offset = offset_[index_of(Sensor::imu)];
   const Time now = t + offset;
   const bool near = !imu_ || (now > *imu_ - least_step && now < *imu_ + longest_interval);
   const bool alone_ahead = imu_ && now > *imu_ + least_step && has_run_ahead(now);
@@ -55,9 +57,9 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
   const bool back = now < *imu_;
   const bool with_others = for_ >= votes && for_ > against_, alone = against_ >= votes && against_ > for_ && legs_spacing_ < often;
   const bool seconded = elsewhere_ >= few_witnesses && (alone || (back && with_others));
-  if (back && !seconded && (elsewhere_ < witnesses || !is_sure())) return Reason::clock_back;
-  if (alone_ahead && !seconded && elsewhere_ < witnesses) return Reason::clock_forward;
-  if (!back && !alone_ahead && elsewhere_ < witnesses) return std::nullopt;
+  if (back && !seconded && (elsewhere_ < clock_witnesses || !is_sure())) return Reason::clock_back;
+  if (alone_ahead && !seconded && elsewhere_ < clock_witnesses) return Reason::clock_forward;
+  if (!back && !alone_ahead && elsewhere_ < clock_witnesses) return std::nullopt;
   const int there = std::exchange(elsewhere_, 0);
   // Ahead with all the others, it is a gap, or a mistake: the timeline looks into that.
   if (!back && !(alone_ahead && seconded)) return note_hole(first_there_), imu_ = now, std::nullopt;
@@ -127,7 +129,7 @@ void ClockSteps::put(Measurement& m, std::size_t s) const {
 
 std::optional<Reason> ClockSteps::follow(Measurement& m) {
   const Sensor sensor = sensor_of(m);
-  const auto s = static_cast<std::size_t>(sensor);
+  const auto s = index_of(sensor);
   const Time t = stamp_of(m);
   if (t < earliest || t > latest) return Reason::absurd_stamp;
   if (sensor == Sensor::imu) {
@@ -142,7 +144,7 @@ std::optional<Reason> ClockSteps::follow(Measurement& m) {
   }
   if (imu_ && elsewhere_ == 0) {
     // Of the IMU's clock, or of one of its own that did not step: the messages come as long after the IMU's as ever.
-    const Duration imu_offset = offset_[static_cast<std::size_t>(Sensor::imu)];
+    const Duration imu_offset = offset_[index_of(Sensor::imu)];
     const Duration stays = *imu_ - (t + offset_[s]), steps = *imu_ - (t + imu_offset);
     const Duration usual = lag_[s].value_or(steps);
     if (open_[s] && !open_until_[s]) open_until_[s] = *imu_ + patience;

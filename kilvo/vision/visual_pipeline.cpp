@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "kilvo/filter/plausible.hpp"
 #include "kilvo/filter/pose_error.hpp"
 #include "kilvo/filter/update.hpp"
 #include "kilvo/vision/depth_view.hpp"
