@@ -24,8 +24,6 @@ class RateOffset {
 
   /// To be added to the times of add(), s; nothing while no offset is sure. 0.6 s at most, either way.
   std::optional<double> offset() const { return is_found_ ? std::optional(offset_) : std::nullopt; }
-  /// Of the offset, s.
-  double sigma() const;
   /// The larger of both rates within the last second, rad/s.
   double liveliness() const;
 

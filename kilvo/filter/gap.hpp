@@ -8,6 +8,9 @@ namespace kilvo {
 /// After an IMU gap longer than this nothing is known of the motion in between but that it was a walking robot's, s.
 inline constexpr double blind_gap = 0.1;
 
+/// Of a stream: messages that are so many periods apart have one missing between them, whatever the jitter.
+inline constexpr double periods_of_a_gap = 2.5;
+
 /// Adds to the covariance what a walking robot may have done in the part [begin, end] of a gap of `gap` s.
 void inflate_covariance_over_gap(Estimate& e, Time begin, Time end, double gap);
 

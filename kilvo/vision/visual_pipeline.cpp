@@ -283,8 +283,7 @@ void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const S
 }
 
 std::optional<double> VisualPipeline::clock_offset() {
-  constexpr double least = 5e-4;  // s
-  const auto offset = mount_check_.time_offset(least);
+  const auto offset = mount_check_.time_offset(least_clock_offset);
   if (!offset) return std::nullopt;
   restart_mount_check();
   forget_map();
