@@ -152,6 +152,13 @@ void Findings::report_turned_camera(const Situation& now, const Eigen::Vector3d&
          tenths(degrees.x()) + ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()));
 }
 
+void Findings::report_new_map(const Situation& now) {
+  ++statistics_.maps_begun_anew;
+  report(now, Sensor::lidar, Reason::map_begun_anew);
+  contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar, now), 2,
+             "for 2 s no sweep fitted the map where it should have been", now);
+}
+
 Sensor Findings::witness_against(Sensor s, const Situation& now) {
   if (s != Sensor::legs && now.legs_used && now.estimate.t - now.last_used_stance < std::chrono::seconds(5)) return Sensor::legs;
   if (s == Sensor::imu && has_lidar(now.modality)) return Sensor::lidar;

@@ -26,8 +26,8 @@ class ImuWatch {
   /// The IMU was silent.
   void restart() { stationarity_.restart(); }
 
-  /// The acceleration has been a usual one for at least `hold`: no impact.
-  bool is_calm(Time t, Duration hold) const { return stationarity_.is_usual(t, hold); }
+  /// The acceleration has been a usual one for long enough: no impact.
+  bool is_calm(Time t) const { return stationarity_.is_usual(t, std::chrono::milliseconds(20)); }
 
   /// With no other sensor: the estimate, if the robot looks like one at rest at `s` and this has not been said just now. It does not move,
   /// and up is where the accelerometer says.

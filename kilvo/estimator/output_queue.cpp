@@ -6,17 +6,13 @@
 
 namespace kilvo {
 
-void OutputQueue::add_sweep(Output o) {
-  o.is_sweep = true;
-  sweeps_.push_back(std::move(o));
-}
-
 std::optional<Output> OutputQueue::next(Time t) {
   if (last_ && t <= *last_) return std::nullopt;
   last_ = t;
   std::optional<Output> o(std::in_place);
   if (!sweeps_.empty()) {
     o = std::move(sweeps_.front());
+    o->is_sweep = true;
     sweeps_.pop_front();
   }
   if (!images_.empty()) {

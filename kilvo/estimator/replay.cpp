@@ -122,14 +122,9 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
 
 std::optional<Eigen::Vector3d> Replay::gyro_at(Time t) const {
   const auto next = std::lower_bound(imu_.begin(), imu_.end(), t, [](const ImuSample& s, Time value) { return s.t < value; });
-  if (next == imu_.end()) {
-    if (to_seconds(t - imu_.back().t) > longest_gap()) return std::nullopt;
-    return imu_.back().gyro;
-  }
-  if (next == imu_.begin() || next->t == t) return next->gyro;
-  const ImuSample& a = *(next - 1);
-  if (to_seconds(next->t - a.t) > longest_gap()) return std::nullopt;
-  return a.gyro + (to_seconds(t - a.t) / to_seconds(next->t - a.t)) * (next->gyro - a.gyro);
+  const bool is_told = next != imu_.end() && (next == imu_.begin() || next->t == t);
+  if (!is_told && to_seconds((next == imu_.end() ? t : next->t) - (next - 1)->t) > longest_gap()) return std::nullopt;
+  return imu_at(t).gyro;
 }
 
 ImuSample Replay::imu_at(Time t) const {

@@ -123,26 +123,19 @@ void ClockSteps::vote(std::size_t s, Time t) {
   ++(with_it < without_it ? for_ : against_);
 }
 
-void ClockSteps::put(Measurement& m, std::size_t s) const {
-  std::visit([&](auto& x) { x.t += offset_[s]; }, m);
-}
-
 std::optional<Reason> ClockSteps::follow(Measurement& m) {
   const Sensor sensor = sensor_of(m);
   const auto s = index_of(sensor);
   const Time t = stamp_of(m);
   if (t < earliest || t > latest) return Reason::absurd_stamp;
-  if (sensor == Sensor::imu) {
-    const auto fault = follow_imu(t);
-    if (!fault || fault == Reason::time_jump) put(m, s);
-    return fault;
-  }
+  std::optional<Reason> fault;
+  if (sensor == Sensor::imu) fault = follow_imu(t);
   if (sensor == Sensor::legs) {
     const Time now = t + offset_[s];
     if (legs_ && now > *legs_) legs_spacing_ = std::min(now - *legs_, legs_spacing_ + legs_spacing_ / 8);
     legs_ = now;
   }
-  if (imu_ && elsewhere_ == 0) {
+  if (sensor != Sensor::imu && imu_ && elsewhere_ == 0) {
     // Of the IMU's clock, or of one of its own that did not step: the messages come as long after the IMU's as ever.
     const Duration imu_offset = offset_[index_of(Sensor::imu)];
     const Duration stays = *imu_ - (t + offset_[s]), steps = *imu_ - (t + imu_offset);
@@ -154,10 +147,11 @@ std::optional<Reason> ClockSteps::follow(Measurement& m) {
     constexpr double most = 0.05;  // s; one message that is late by hours is not to be followed
     lag_[s] = usual + from_seconds(std::clamp(to_seconds(lag) - to_seconds(usual), -most, most) / 10);
     newest_[s] = std::max(newest_[s].value_or(t + offset_[s]), t + offset_[s]);
-  } else if (imu_) {
+  } else if (sensor != Sensor::imu && imu_) {
     vote(s, t);
   }
-  return put(m, s), std::nullopt;
+  if (!fault || fault == Reason::time_jump) std::visit([&](auto& x) { x.t += offset_[s]; }, m);
+  return fault;
 }
 
 }  // namespace kilvo

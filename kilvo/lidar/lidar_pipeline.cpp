@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "kilvo/filter/innovation.hpp"
 #include "kilvo/filter/update.hpp"
 #include "kilvo/lidar/relocate.hpp"
 
 namespace kilvo {
 namespace {
 
-// After an outage so many sweeps in a row must agree with what was expected before the map grows again.
-constexpr int consistent_sweeps = 3;
 // Sweeps that fitted nowhere for so long: the robot is where the map is not.
 constexpr Duration longest_refusal = std::chrono::seconds(2);
 // Less than this share of a sweep's clusters on known surfaces: it says little of whether the map is the right one.
@@ -187,10 +186,8 @@ bool LidarPipeline::refuse(Time t, bool map_is_given) {
   return true;
 }
 
-void LidarPipeline::rejoin() { sweeps_to_go_ = consistent_sweeps; }
-
 LidarPipeline::ClockEvidence LidarPipeline::compare_turns(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory,
-                                                          Time begin, Time end, double least) {
+                                                          Time begin, Time end) {
   const auto first = trajectory.at(begin), last = trajectory.at(end);
   if (!first || !last || end <= begin || is_blind_somewhere() || is_rejoining()) {
     mount_error_.restart();
@@ -199,7 +196,7 @@ LidarPipeline::ClockEvidence LidarPipeline::compare_turns(const Estimate& prior,
   if (config_.mount_error) mount_error_.add(prior.t, posterior.x.R, trajectory);
   const Eigen::Vector3d rate = (first->R.inverse() * last->R).Log() / to_seconds(end - begin);
   time_offset_.add((prior.x.R.inverse() * posterior.x.R).Log(), rate);
-  const ClockEvidence out = {time_offset_.is_doubtful(), time_offset_.offset(least)};
+  const ClockEvidence out = {time_offset_.is_doubtful(), time_offset_.offset(least_clock_offset)};
   if (out.offset) time_offset_.restart();
   return out;
 }
