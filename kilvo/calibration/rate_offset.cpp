@@ -134,7 +134,11 @@ void RateOffset::refine(const Sample& sample) {
   const double expected = 3 * noise_ + slope.squaredNorm() * variance_;
   if (squared > gate * gate * expected) {
     // Nothing fits any more: another clock, or it was the wrong one.
-    if (++refused_ > most_refused) begin_anew();
+    if (++refused_ <= most_refused) return;
+    squares_.fill(0);
+    samples_ = 0;
+    refused_ = 0;
+    is_found_ = false;
     return;
   }
   refused_ = 0;
@@ -143,14 +147,5 @@ void RateOffset::refine(const Sample& sample) {
   offset_ = std::clamp(offset_ + gain * slope.dot(difference), -most * step, most * step);
   variance_ *= 1 - gain * slope.squaredNorm();
 }
-
-void RateOffset::begin_anew() {
-  squares_.fill(0);
-  samples_ = 0;
-  refused_ = 0;
-  is_found_ = false;
-}
-
-double RateOffset::liveliness() const { return std::max(lively_reference_, lively_other_); }
 
 }  // namespace kilvo

@@ -21,11 +21,6 @@ void LivePropagator::become(const History& history, const LegPipeline& legs, con
   with_legs_ = false;
 }
 
-// Both ends of the IMU's intervals up to the newest sample that is not after `until` are known now.
-void LivePropagator::close(Time until) {
-  history_.close_fork(until, status_.has_legs() ? std::optional(status_.last_legs()) : std::nullopt);
-}
-
 // What is not finite goes nowhere: it is silent until the estimator, which throws such a state away, is forked again.
 bool LivePropagator::keep_finite() {
   started_ = is_finite(history_.now());
@@ -41,23 +36,23 @@ bool LivePropagator::push(const ImuSample& raw) {
   if (imu_.prepare(s)) return false;
   history_.add(s);
   // The estimator will report it as well, once it has stopped waiting for them.
-  if (status_.has_legs() && status_.are_legs_silent(s.t - status_.last_legs() - lag_)) status_.miss_legs();
+  if (status_.has_legs() && status_.are_legs_silent(s.t - *status_.last_legs() - lag_)) status_.miss_legs();
   if (status_.has_legs() && !status_.are_legs_overdue(s.t - lag_)) return false;
-  close(s.t);
+  history_.close_fork(s.t, status_.last_legs());
   with_legs_ = false;
   return keep_finite();
 }
 
 bool LivePropagator::push(const Feet& feet) {
   if (!started_ || imu_lost()) return false;
-  if (!status_.has_legs() || feet.t <= status_.last_legs() || feet.t < known()) return false;
+  if (!status_.has_legs() || feet.t <= *status_.last_legs() || feet.t < known()) return false;
   if (status_.is_imu_missing(feet.t - history_.replay().newest_imu().t)) return false;
-  if (status_.are_legs_silent(feet.t - status_.last_legs())) {
+  if (status_.are_legs_silent(feet.t - *status_.last_legs())) {
     status_.lose_legs(true);  // they come again: how, the estimator decides
     return false;
   }
   Stopwatch watch;
-  close(feet.t);
+  history_.close_fork(feet.t, status_.last_legs());
   if (feet.t < history_.now().t) return false;
   status_.legs_used(feet.t);
   history_.predict_to(feet.t);

@@ -41,7 +41,6 @@ class LivePropagator {
               const PoseCovariance& common_error, std::uint32_t epoch);
 
  private:
-  void close(Time until);
   bool keep_finite();
 
   bool started_ = false;

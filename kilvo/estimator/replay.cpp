@@ -95,7 +95,7 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   const ProcessNoise noise = noise_now();
   const auto step = [&](ImuInterval interval) {
     // What was missed or clipped is in no mean.
-    interval.made_biases = is_of_rest(interval.end) && interval.gyro_scale == 1 && interval.accel_scale == 1;
+    interval.made_biases = rest_until_ && interval.end <= *rest_until_ && interval.gyro_scale == 1 && interval.accel_scale == 1;
     if (interval.begin < sweep_noise_.until) {
       interval.gyro_scale *= 1 - sweep_noise_.rotation;
       interval.velocity_scale *= 1 - sweep_noise_.position;
@@ -252,8 +252,7 @@ const Estimate& Replay::nearest(Time t, const Estimate& oldest) const {
 }
 
 void Replay::doubt_acceleration(const Estimate& base) {
-  remembered_.clear();
-  taken_.clear();
+  forget_estimates();
   usual_.accel_density2 = usual_.accel_bend2 = 0;  // they were of what is wrong
   for (ImuSample& s : imu_) {
     if (s.t <= base.t) continue;
@@ -263,8 +262,7 @@ void Replay::doubt_acceleration(const Estimate& base) {
 }
 
 void Replay::forget_before(Time t) {
-  remembered_.clear();
-  taken_.clear();
+  forget_estimates();
   while (imu_.size() > 2 && imu_[1].t <= t) imu_.pop_front();
   while (steps_.size() > 1 && steps_[1].t <= t) steps_.pop_front();
 }

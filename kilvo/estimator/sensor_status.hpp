@@ -34,7 +34,7 @@ class SensorStatus {
   /// They are lost, and nothing else is asked about: who runs ahead cannot know why.
   void miss_legs();
   bool has_legs() const { return last_legs_.has_value(); }
-  Time last_legs() const { return *last_legs_; }
+  std::optional<Time> last_legs() const { return last_legs_; }
   /// End of the last sweep that was used, or the start.
   Time last_sweep() const { return last_sweep_; }
 

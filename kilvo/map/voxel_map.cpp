@@ -187,11 +187,6 @@ void VoxelMap::free_tree(std::uint32_t index) {
   --node_count_;
 }
 
-void VoxelMap::erase_root(VoxelKey key) {
-  free_tree(roots_.find(key));
-  roots_.erase(key);
-}
-
 void VoxelMap::forget(const Eigen::Vector3d& centre) {
   const bool too_many = node_count_ > static_cast<std::size_t>(config_.max_nodes);
   if (!too_many && (centre - last_forget_).norm() < 0.05 * config_.radius) return;
@@ -200,7 +195,8 @@ void VoxelMap::forget(const Eigen::Vector3d& centre) {
   const auto drop_beyond = [&](double radius) {
     std::erase_if(keys_, [&](VoxelKey key) {
       if (squared_distance(key) <= radius * radius) return false;
-      erase_root(key);
+      free_tree(roots_.find(key));
+      roots_.erase(key);
       return true;
     });
   };

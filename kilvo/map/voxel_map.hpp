@@ -140,7 +140,6 @@ class VoxelMap {
   static std::size_t direction_cell(const Eigen::Vector3d& way);
   void forget_plane(const Path& path, int level, const Eigen::Vector3d& origin);
   void free_children(Node& node);
-  void erase_root(VoxelKey key);
   void free_tree(std::uint32_t node);
 
   MapConfig config_;
