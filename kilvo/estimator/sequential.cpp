@@ -129,7 +129,7 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
   if (const auto offset = vision_->clock_offset())
     findings_.report_clock_offset(situation(), Sensor::camera, input_.shift_by(Sensor::camera, *offset), robot_.camera.time_offset);
   if (seen.carries) status_.image_used(image.t);
-  result.indicators = indicators_of(seen.used);
+  result.indicators = indicators_of(seen.used, seen.carries);
   result.stages.visual_us = watch.lap_us();
   outputs_.add_image(std::move(result));
 }
