@@ -26,18 +26,18 @@ void Replay::inflate_for_missed(ImuInterval& interval, double gap) const {
 
 // Beyond the end of its range an IMU may have seen anything of the same size.
 void Replay::inflate_for_clipping(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
-  constexpr double gyro = 3, accel = 20, correlation = 0.01;  // rad/s, m/s^2: what may be missing; s: for so long
+  constexpr double missing_gyro = 3, missing_accel = 20, correlation = 0.01;  // rad/s, m/s^2; s: for so long
   const auto scale = [](double missing, double noise) { return missing * missing * correlation / (noise * noise); };
-  if (a.gyro_clipped || b.gyro_clipped) interval.gyro_scale = scale(gyro, config_.noise.gyro);
-  if (a.accel_clipped || b.accel_clipped) interval.accel_scale = scale(accel, config_.noise.accel);
+  if (a.gyro_clipped || b.gyro_clipped) interval.gyro_scale = scale(missing_gyro, config_.noise.gyro);
+  if (a.accel_clipped || b.accel_clipped) interval.accel_scale = scale(missing_accel, config_.noise.accel);
 }
 
 // No body turns or is pushed so much within one sample: one of the two is wrong in all that it says, or little is known of between.
 void Replay::inflate_for_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
-  constexpr double gyro = 3, accel = 100;  // rad/s, m/s^2
+  constexpr double largest_turn = 3, largest_push = 100;  // rad/s, m/s^2
   const double dt = to_seconds(b.t - a.t), turned = (b.gyro - a.gyro).norm(), pushed = (b.accel - a.accel).norm();
   const auto scale = [dt](double jump, double noise) { return jump * jump * dt / (noise * noise); };
-  if (turned <= gyro && pushed <= accel) return;
+  if (turned <= largest_turn && pushed <= largest_push) return;
   interval.gyro_scale = std::max(interval.gyro_scale, scale(turned, config_.noise.gyro));
   interval.accel_scale = std::max(interval.accel_scale, scale(pushed, config_.noise.accel));
 }

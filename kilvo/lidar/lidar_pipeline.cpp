@@ -24,8 +24,9 @@ constexpr double six_at_99_9 = 22.46;
 bool says_enough(const RegistrationReport& report) { return report.matched >= fewest_rows && report.degeneracy.weak_count <= most_weak; }
 
 // A scan that was undistorted with a velocity that is not known: its ends are out of place, at the worst all on one side.
-PoseCovariance noise_of_velocity(const Covariance& P) {
-  constexpr double half_scan = 0.05, on_one_side = 0.5, per_metre = 0.3;  // s, -, rad/m
+PoseCovariance noise_of_velocity(const Covariance& P, double rate) {
+  constexpr double on_one_side = 0.5, per_metre = 0.3;  // -, rad/m
+  const double half_scan = 0.5 / rate;                  // s
   const double smear = half_scan * half_scan * P.diagonal().segment<3>(at::v).maxCoeff();
   PoseCovariance out = PoseCovariance::Zero();
   out.diagonal().head<3>().setConstant(per_metre * per_metre * smear);
@@ -106,7 +107,7 @@ Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estim
 void LidarPipeline::track(const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out) const {
   UpdateConfig patient = update_;
   if (is_rejoining()) patient.max_iterations *= 3;
-  const PoseCovariance noise = is_rejoining() ? within_scan.V + noise_of_velocity(prior.P) : within_scan.V;
+  const PoseCovariance noise = is_rejoining() ? within_scan.V + noise_of_velocity(prior.P, mount_.rate) : within_scan.V;
   const auto measured = [&](const State& x, const Covariance& P) {
     Information<6> info = model(x, P);
     add_common_noise(noise, info);
@@ -128,7 +129,7 @@ void LidarPipeline::search(const VoxelMap& map, const Estimate& prior, LidarMode
   }
   rejoin();
   constexpr double found_rotation = 0.006, found_position = 0.005;  // rad, m
-  PoseCovariance guessed = within_scan.V + noise_of_velocity(prior.P);
+  PoseCovariance guessed = within_scan.V + noise_of_velocity(prior.P, mount_.rate);
   guessed.diagonal().head<3>().array() += found_rotation * found_rotation;
   guessed.diagonal().tail<3>().array() += found_position * found_position;
   const auto measured = [&](const State& x, const Covariance&) {
