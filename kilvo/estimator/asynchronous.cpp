@@ -7,12 +7,6 @@
 #include "kilvo/math/stopwatch.hpp"
 
 namespace kilvo {
-namespace {
-
-// Without sweeps nothing older than this will be propagated again.
-constexpr Duration longest_history = std::chrono::seconds(2);
-
-}  // namespace
 
 void Estimator::process(ImuSample s, std::vector<Output>& out) {
   if (const auto fault = imu_.prepare(s)) return findings_.drop(Sensor::imu, *fault);
@@ -34,7 +28,7 @@ void Estimator::process(ImuSample s, std::vector<Output>& out) {
   }
   status_.imu_is_back();
   history_.add(s);
-  imu_.add(s);
+  imu_.add(s, history_.now().x.bg);
   if (s.t < history_.closed().t) return;
   if (frames_.has_one_until(s.t)) {
     history_.drop_leg_updates_ahead();
@@ -44,6 +38,7 @@ void Estimator::process(ImuSample s, std::vector<Output>& out) {
   history_.close(s.t);
   if (!status_.has_legs()) history_.take_closing_us();
   if (keep_plausible()) history_.remember_good();
+  constexpr Duration longest_history = std::chrono::seconds(2);  // without sweeps nothing older will be propagated again
   if (s.t - history_.base().t > longest_history && frames_.empty()) history_.rebase_to_closed();
   choose_modality(s.t);
   findings_.look(s.t, situation());

@@ -21,8 +21,8 @@ class ImuWatch {
 
   /// Brings a sample to m/s^2 and marks what is clipped. Says why it is not to be used.
   std::optional<Reason> prepare(ImuSample& s);
-  /// A sample that is used.
-  void add(const ImuSample& s) { stationarity_.add(s); }
+  /// A sample that is used; what is known of the gyro's bias.
+  void add(const ImuSample& s, const Eigen::Vector3d& gyro_bias) { stationarity_.add(s, gyro_bias); }
   /// The IMU was silent.
   void restart() { stationarity_.restart(); }
 
