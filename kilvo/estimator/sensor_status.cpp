@@ -6,12 +6,6 @@
 
 namespace kilvo {
 
-// theta_s of Eq. 16 for sweeps and images: so many periods, but no less than what a message that is lost makes.
-bool SensorStatus::is_silent(Sensor s, Duration since, double periods) const {
-  constexpr Duration least_silence = std::chrono::milliseconds(300);
-  return since > std::max(least_silence, from_seconds(periods / rate_of(s)));
-}
-
 bool SensorStatus::are_legs_silent(Duration since) const {
   constexpr Duration least_silence = std::chrono::milliseconds(50);
   return since > std::max(least_silence, from_seconds(5 / rate_of(Sensor::legs)));
@@ -73,7 +67,7 @@ bool SensorStatus::may_legs_return(Time t, bool is_calm, bool is_velocity_known,
   if (health.is_frozen(Sensor::legs)) return false;
   // Sweeps, if there are any, tell the velocity soon.
   const auto heard = health.heard(Sensor::lidar);
-  const bool sweeps = heard && !is_silent(Sensor::lidar, t - *heard, 4);
+  const bool sweeps = heard && !is_silence(t - *heard, rate_of(Sensor::lidar));
   const bool ready = (is_calm || settles_nothing_) && (is_velocity_known || !sweeps);
   if (!ready && !has_waited_long) return false;
   waits_since_[index_of(Sensor::legs)].reset();
@@ -95,8 +89,8 @@ void SensorStatus::lose_imu(const Health& health) {
 }
 
 SensorStatus::Change SensorStatus::choose(Time t, const Health& health) {
-  const bool lidar = with_lidar_ && !is_silent(Sensor::lidar, t - last_sweep_);
-  const bool camera = last_image_ && !is_silent(Sensor::camera, t - *last_image_);
+  const bool lidar = with_lidar_ && !is_silence(t - last_sweep_, rate_of(Sensor::lidar));
+  const bool camera = last_image_ && !is_silence(t - *last_image_, rate_of(Sensor::camera));
   const Modality now = modality_of(has_legs(), lidar, camera);
   const bool after_outage = cause_ == Reason::imu_lost || cause_ == Reason::imu_frozen;
   if (after_outage) cause_ = Reason::imu_back;
@@ -114,7 +108,7 @@ Reason SensorStatus::cause_of_change(Time t, Modality now, const Health& health)
     return kilvo::has_legs(now) ? Reason::legs_back : health.is_frozen(Sensor::legs) ? Reason::legs_frozen : Reason::legs_lost;
   if (has_camera(now)) return Reason::camera_used;
   const auto heard = health.heard(Sensor::camera);
-  const bool silent = !heard || is_silent(Sensor::camera, t - *heard);
+  const bool silent = !heard || is_silence(t - *heard, rate_of(Sensor::camera));
   return health.is_frozen(Sensor::camera) ? Reason::camera_frozen : silent ? Reason::camera_lost : Reason::camera_useless;
 }
 

@@ -68,7 +68,6 @@ class SensorStatus {
  private:
   Reason cause_of_change(Time t, Modality now, const Health& health) const;
   double rate_of(Sensor s) const { return rates_[index_of(s)]; }
-  bool is_silent(Sensor s, Duration since, double periods = 3) const;
   bool has_waited(Sensor s, Time t);
 
   std::array<double, sensor_count> rates_;  // Hz, by Sensor

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "kilvo/estimator/estimator.hpp"
+#include "kilvo/filter/gap.hpp"
 #include "kilvo/math/stopwatch.hpp"
 
 namespace kilvo {
@@ -95,8 +96,8 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
   if (!motion) return refuse(Reason::before_state);
   if (history_.replay().is_blind(image.t, image.t)) return refuse(Reason::no_imu);
   // Vision lives by the surfaces of the LiDAR: without it, nobody can tell what hides what, and images can only drift.
-  constexpr double scans = 3.5;
-  if (image.t - frames_.last_middle().value_or(Time{}) > from_seconds(scans / robot_.lidar.rate)) return refuse(Reason::no_lidar);
+  const Duration half_scan = from_seconds(0.5 / robot_.lidar.rate);
+  if (is_silence(image.t - frames_.last_middle().value_or(Time{}) - half_scan, robot_.lidar.rate)) return refuse(Reason::no_lidar);
   if (lidar_.is_rejoining()) return refuse(Reason::before_rejoined);
   if (!status_.may_frame_return(Sensor::camera, image.t, imu_.is_calm(image.t))) return refuse(Reason::not_calm);
   Stopwatch watch;

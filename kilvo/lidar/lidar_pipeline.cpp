@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "kilvo/filter/gap.hpp"
 #include "kilvo/filter/innovation.hpp"
 #include "kilvo/filter/update.hpp"
 #include "kilvo/lidar/relocate.hpp"
@@ -60,8 +61,7 @@ bool LidarPipeline::has_shape(Time end, const Estimate& prior) const {
 }
 
 void LidarPipeline::note_silence(Duration silence) {
-  constexpr int periods = 4;
-  if (silence > from_seconds(periods / mount_.rate)) sweeps_to_go_ = std::max(sweeps_to_go_, consistent_sweeps);
+  if (is_silence(silence, mount_.rate)) sweeps_to_go_ = std::max(sweeps_to_go_, consistent_sweeps);
 }
 
 Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory,
