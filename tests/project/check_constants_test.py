@@ -4,7 +4,7 @@ import unittest
 
 from planted_tree import PlantedTree
 
-LIMIT = 510
+LIMIT = 491
 
 
 class CheckConstants(PlantedTree):
