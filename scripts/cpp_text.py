@@ -167,3 +167,66 @@ def scan(text: str) -> Iterator[Scope | Statement]:
         else:
             brackets += (char in "([") - (char in ")]")
             head += char
+
+
+class Class(NamedTuple):
+    name: str
+    line: int
+    data: int               # data members that are no constants
+    private_functions: int
+
+
+_CLASS = re.compile(r"\bclass\s+(?:alignas\s*\([^)]*\)\s*)?(\w[\w:]*)[^;{}()]*\{")
+
+
+def _closing(text: str, opening: int) -> int:
+    """Where the brace at `opening` is closed."""
+    depth = 0
+    for i in range(opening, len(text)):
+        depth += (text[i] == "{") - (text[i] == "}")
+        if depth == 0:
+            return i
+    return len(text)
+
+
+def _members(body: str) -> Iterator[tuple[str, str, bool]]:
+    """Access, text and whether it is a function, of each member of a class; a braced value is written {}, a nested type by its head."""
+    access, head, i, brackets = "private", "", 0, 0
+    while i < len(body):
+        char = body[i]
+        brackets += (char in "([") - (char in ")]")
+        if char == "{" and not brackets:
+            kind, i = _opens(head), _closing(body, i)
+            if kind == "function":
+                yield access, head.strip(), True
+            head = "" if kind == "function" else head + (_VALUE if kind == "value" else "{}")
+        elif char == "{":
+            i = _closing(body, i)
+        elif char == ";" and not brackets:
+            if head.strip():
+                yield access, head.strip(), "()" in _flat(head.replace(_VALUE, "")).split("=")[0]
+            head = ""
+        elif char == ":" and head.strip() in ("public", "protected", "private"):
+            access, head = head.strip(), ""
+        else:
+            head += char
+        i += 1
+
+
+def classes(text: str) -> Iterator[Class]:
+    """What each class (no struct: that is data by design) of `text` holds."""
+    text = _without_preprocessor(without_comments(text))
+    for match in _CLASS.finditer(text):
+        if re.search(r"\benum\s+$", text[:match.start()]):
+            continue
+        data = functions = 0
+        for access, member, is_function in _members(text[match.end():_closing(text, match.end() - 1)]):
+            if re.match(r"(?:using|friend|typedef|static_assert)\b", member):
+                continue
+            if is_function:
+                functions += access == "private"
+            elif not re.match(r"(?:template\b|(?:inline\s+)?(?:static|constexpr)\b)", member):
+                is_type = re.match(r"(?:class|struct|union|enum)\b", member)
+                declared = member.rpartition("{}")[2] if is_type and "{}" in member else "" if is_type else member
+                data += _flat(declared).count(",") + 1 if declared.strip() else 0
+        yield Class(match[1], text.count("\n", 0, match.start()) + 1, data, functions)

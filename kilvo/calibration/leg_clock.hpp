@@ -54,7 +54,6 @@ class LegClock {
 
   /// What was found: added to the legs' times of arrival, so that they trail the IMU's by nothing, s.
   std::optional<double> offset() const { return rates_.offset(); }
-  double sigma() const { return rates_.sigma(); }
   /// Leg samples that were not used since their time was not known.
   std::uint64_t withheld() const { return withheld_; }
 

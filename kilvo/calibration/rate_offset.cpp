@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "kilvo/filter/gap.hpp"
+
 namespace kilvo {
 namespace {
 
@@ -16,7 +18,6 @@ constexpr int neighbours = 8;              // steps of the grid
 constexpr double forgetting = 1.0 / 1000;  // of what the grid has seen, a sample
 // How an offset wanders: delays change by a tenth of a millisecond in a second.
 constexpr double walk = 1e-4;  // s/sqrt(s)
-constexpr double first_sigma = 0.005;
 constexpr double gate = 4;
 constexpr int most_refused = 300;
 
@@ -27,10 +28,9 @@ RateOffset::RateOffset() : reference_(kept, Eigen::Vector3d::Zero()) { waiting_.
 std::int64_t RateOffset::place_of(Time t) const { return static_cast<std::int64_t>(std::floor(to_seconds(t - *origin_) / step)); }
 
 void RateOffset::add_reference(Time t, const Eigen::Vector3d& rate) {
-  constexpr double longest_gap = 0.1;  // s
-  const double span = last_reference_ ? to_seconds(t - *last_reference_) : 2 * longest_gap;
-  if (span <= 0 && span > -longest_gap) return;
-  if (std::abs(span) > longest_gap) {
+  const double span = last_reference_ ? to_seconds(t - *last_reference_) : 2 * blind_gap;
+  if (span <= 0 && span > -blind_gap) return;
+  if (std::abs(span) > blind_gap) {
     // What came before the gap, or before a recording was played again, is of no use. The offset is of the clocks, and stays.
     origin_ = t;
     end_ = 0;
@@ -120,7 +120,7 @@ void RateOffset::decide() {
   if (!(others - squares_[static_cast<std::size_t>(best)] > 2 * certain * variance)) return;
   is_found_ = true;
   offset_ = (static_cast<double>(best) - most) * step;
-  variance_ = first_sigma * first_sigma;
+  variance_ = step * step;  // the jitter of delays is no larger
   noise_ = variance;
 }
 
@@ -134,7 +134,11 @@ void RateOffset::refine(const Sample& sample) {
   const double expected = 3 * noise_ + slope.squaredNorm() * variance_;
   if (squared > gate * gate * expected) {
     // Nothing fits any more: another clock, or it was the wrong one.
-    if (++refused_ > most_refused) begin_anew();
+    if (++refused_ <= most_refused) return;
+    squares_.fill(0);
+    samples_ = 0;
+    refused_ = 0;
+    is_found_ = false;
     return;
   }
   refused_ = 0;
@@ -143,16 +147,5 @@ void RateOffset::refine(const Sample& sample) {
   offset_ = std::clamp(offset_ + gain * slope.dot(difference), -most * step, most * step);
   variance_ *= 1 - gain * slope.squaredNorm();
 }
-
-void RateOffset::begin_anew() {
-  squares_.fill(0);
-  samples_ = 0;
-  refused_ = 0;
-  is_found_ = false;
-}
-
-double RateOffset::sigma() const { return std::sqrt(variance_); }
-
-double RateOffset::liveliness() const { return std::max(lively_reference_, lively_other_); }
 
 }  // namespace kilvo

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -24,10 +25,8 @@ class RateOffset {
 
   /// To be added to the times of add(), s; nothing while no offset is sure. 0.6 s at most, either way.
   std::optional<double> offset() const { return is_found_ ? std::optional(offset_) : std::nullopt; }
-  /// Of the offset, s.
-  double sigma() const;
   /// The larger of both rates within the last second, rad/s.
-  double liveliness() const;
+  double liveliness() const { return std::max(lively_reference_, lively_other_); }
 
  private:
   static constexpr double step = 0.005;     // s, of the grid
@@ -47,7 +46,6 @@ class RateOffset {
   void try_all(const Sample& sample);
   void decide();
   void refine(const Sample& sample);
-  void begin_anew();
 
   // The reference on the grid, from its first sample on.
   std::vector<Eigen::Vector3d> reference_;

@@ -3,17 +3,10 @@
 #include <cmath>
 
 #include "kilvo/estimator/estimator.hpp"
-#include "kilvo/estimator/silence.hpp"
 #include "kilvo/filter/gap.hpp"
 #include "kilvo/math/stopwatch.hpp"
 
 namespace kilvo {
-namespace {
-
-// Without sweeps nothing older than this will be propagated again.
-constexpr Duration longest_history = std::chrono::seconds(2);
-
-}  // namespace
 
 void Estimator::process(ImuSample s, std::vector<Output>& out) {
   if (const auto fault = imu_.prepare(s)) return findings_.drop(Sensor::imu, *fault);
@@ -21,26 +14,31 @@ void Estimator::process(ImuSample s, std::vector<Output>& out) {
   findings_.use(Sensor::imu);
   // Where the IMU was silent as well, nobody can say that the legs are lost.
   const Time heard = history_.replay().has_imu() ? history_.replay().newest_imu().t : s.t;
-  if (to_seconds(s.t - heard) > blind_gap) {
-    // Feet may have been lifted and set down in between; the velocity is anything that a walking robot's may be.
+  const bool was_blind = to_seconds(s.t - heard) > blind_gap;
+  if (was_blind) {
     lose_imu(out);
     lidar_.rejoin();
     imu_.restart();
-    if (status_.has_legs()) lose_legs(heard);
+  }
+  // Feet may have been lifted and set down in a gap; the velocity is anything that a walking robot's may be.
+  if ((was_blind && status_.has_legs()) || (s.t >= history_.closed().t && status_.are_legs_lost(heard, input_.health()))) {
+    history_.end_stances(was_blind ? heard : s.t);
+    legs_.restart();
+    status_.lose_legs(findings_.statistics().sensors[index_of(Sensor::legs)].used > 0);
   }
   status_.imu_is_back();
   history_.add(s);
-  imu_.add(s);
+  imu_.add(s, history_.now().x.bg);
   if (s.t < history_.closed().t) return;
-  if (status_.are_legs_lost(heard, input_.health())) lose_legs(s.t);
   if (frames_.has_one_until(s.t)) {
     history_.drop_leg_updates_ahead();
-    process_frames(s.t, out);
+    while (auto frame = frames_.pop(s.t)) std::visit([&](const auto& what) { process(what, *frame, out); }, frame->what);
     history_.resume(history_.now());
   }
   history_.close(s.t);
   if (!status_.has_legs()) history_.take_closing_us();
   if (keep_plausible()) history_.remember_good();
+  constexpr Duration longest_history = std::chrono::seconds(2);  // without sweeps nothing older will be propagated again
   if (s.t - history_.base().t > longest_history && frames_.empty()) history_.rebase_to_closed();
   choose_modality(s.t);
   findings_.look(s.t, situation());
@@ -57,10 +55,9 @@ void Estimator::process(const JointSample& s, std::vector<Output>& out) {
   Stopwatch watch;
   const Replay& replay = history_.replay();
   if (s.t < history_.now().t || !replay.has_imu()) return findings_.drop(Sensor::legs, Reason::before_state);
-  if (status_.imu_lost() || to_seconds(s.t - replay.newest_imu().t) > longest_held_imu(robot_.imu.rate))
-    return findings_.drop(Sensor::legs, Reason::no_imu);
+  if (status_.imu_lost() || status_.is_imu_missing(s.t - replay.newest_imu().t)) return findings_.drop(Sensor::legs, Reason::no_imu);
   const double sigma_v = std::sqrt(std::max(0.0, history_.now().P.block<3, 3>(at::v, at::v).trace() / 3));
-  if (!status_.may_legs_return(s.t, is_settled(s.t), sigma_v < known_velocity, input_.health()))
+  if (!status_.may_legs_return(s.t, imu_.is_calm(s.t), sigma_v < known_velocity, input_.health()))
     return findings_.drop(Sensor::legs, Reason::not_calm);
   auto known = kinematics_->feet(s);
   if (const auto* fault = std::get_if<std::string>(&known)) return findings_.drop(Sensor::legs, Reason::wrong_joints, *fault);
@@ -95,12 +92,6 @@ void Estimator::lose_imu(std::vector<Output>& out) {
   inflate_covariance_over_gap(e, e.t, e.t + from_seconds(blind_gap), blind_gap);
   e.t = std::max(e.t, outputs_.last().value_or(e.t) + Duration(1000));
   emit(e, out);
-}
-
-void Estimator::lose_legs(Time t) {
-  history_.end_stances(t);
-  legs_.restart();
-  status_.lose_legs(findings_.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0);
 }
 
 }  // namespace kilvo

@@ -3,16 +3,6 @@
 #include "kilvo/math/decompositions.hpp"
 
 namespace kilvo {
-namespace {
-
-// A third each would be a sweep that knows all directions equally well.
-constexpr double least_share = 0.005;
-// A cloud that is a sheet or a line; the information speaks for itself, so this alone degrades only what is next to flat.
-constexpr double least_ratio = 1e-4;
-// Each says two things, of seven that are looked for.
-constexpr int fewest_visual_points = 10;
-
-}  // namespace
 
 double eigenvalue_ratio(std::span<const PointXYZI> points) {
   if (points.size() < 4) return 0;
@@ -33,13 +23,12 @@ double eigenvalue_ratio(std::span<const PointXYZI> points) {
 }
 
 std::vector<Indicator> indicators_of(std::span<const PointXYZI> points, const RegistrationReport& report) {
-  const double ratio = eigenvalue_ratio(points), share = report.degeneracy.smallest_share;
-  return {{"lidar_ratio", ratio, ratio < least_ratio},
-          {"lidar_share", share, report.matched > 0 && (report.degeneracy.weak_count > 0 || share < least_share)}};
+  return {{"lidar_ratio", eigenvalue_ratio(points), false},
+          {"lidar_share", report.degeneracy.smallest_share, report.degeneracy.weak_count > 0}};
 }
 
-std::vector<Indicator> indicators_of(int visual_points) {
-  return {{"visual_points", static_cast<double>(visual_points), visual_points < fewest_visual_points}};
+std::vector<Indicator> indicators_of(int visual_points, bool carries) {
+  return {{"visual_points", static_cast<double>(visual_points), !carries}};
 }
 
 }  // namespace kilvo

@@ -12,7 +12,7 @@ namespace kilvo {
 struct Indicator {
   const char* name = "";
   double value = 0;
-  bool degraded = false;
+  bool degraded = false;  // as it was decided: a direction was not updated, the patches did not carry the estimate
 };
 
 /// How flat the cloud is (paper, Section IV-E): smallest eigenvalue of the points' scatter over the largest.
@@ -22,6 +22,6 @@ double eigenvalue_ratio(std::span<const PointXYZI> points);
 std::vector<Indicator> indicators_of(std::span<const PointXYZI> points, const RegistrationReport& report);
 
 /// Of an image: `visual_points`, the points of the map that it shows as they were.
-std::vector<Indicator> indicators_of(int visual_points);
+std::vector<Indicator> indicators_of(int visual_points, bool carries);
 
 }  // namespace kilvo

@@ -6,15 +6,20 @@
 
 #include "kilvo/estimator/live_propagator.hpp"
 #include "kilvo/filter/gap.hpp"
-#include "kilvo/filter/plausible.hpp"
 
 namespace kilvo {
+namespace {
+
+// What the filter's covariance lacks of the error relative to the first pose: of the map, of the LiDAR's mount, of the legs' description.
+PoseCovariance common_error(const WorldMap& map, const LidarPipeline& lidar, const LegPipeline& legs, const State& x) {
+  return map.error_at(x.pose()) + lidar.mount_error_at(x.pose()) + legs.description_error(x);
+}
+
+}  // namespace
 
 Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::array<bool, sensor_count> used)
     : robot_(robot),
       config_(config),
-      settles_all_(config.settling == "all"),
-      settles_nothing_(config.settling == "none"),
       input_(robot, used, from_seconds(config.max_wait), config.wait_for_images),
       starter_(config),
       imu_(robot.imu, config.initial),
@@ -23,7 +28,7 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       lidar_(robot.lidar, config.lidar, config.update, config.noise, config.threads),
       map_(config.map, config.lidar, robot.lidar.T_imu_lidar.p),
       frames_(robot.lidar.rate, input_.uses(Sensor::lidar), config.lidar.recut && input_.uses(Sensor::camera)),
-      status_(robot, input_.uses(Sensor::lidar)) {
+      status_(robot, input_.uses(Sensor::lidar), config.settling) {
   if (!input_.uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.surfaces().leaf_size() * (1 + 1e-9))
     throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
@@ -40,7 +45,17 @@ std::vector<Output> Estimator::push(Measurement m) {
 void Estimator::push(Measurement m, std::vector<Output>& out) {
   input_.push(std::move(m));
   if (input_.clock_steps().count() > statistics().clock_steps) findings_.report_clock_steps(situation(), input_.clock_steps());
-  if (input_.time_went_back()) begin_new_epoch(out);
+  if (input_.time_went_back()) {
+    // Another recording, or the same again. What waited belongs to the time before; nothing else is kept.
+    finish(out);
+    InputQueue input = input_.next_epoch();
+    Estimator fresh(robot_, config_, input.used());
+    fresh.input_ = std::move(input);
+    fresh.findings_ = findings_.next_epoch();
+    if (map_.is_given()) fresh.give_map(map_.take());
+    *this = std::move(fresh);
+    findings_.report(situation(), {}, Reason::began_anew, to_seconds(input_.clock_steps().last()));
+  }
   if (input_.health().imu_silence() > blind_gap) lose_imu(out);
   drain(out);
 }
@@ -103,18 +118,6 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   }
 }
 
-// The time went back: another recording, or the same again. What waited belongs to the time before; nothing else is kept.
-void Estimator::begin_new_epoch(std::vector<Output>& out) {
-  finish(out);
-  InputQueue input = input_.next_epoch();
-  Estimator fresh(robot_, config_, input.used());
-  fresh.input_ = std::move(input);
-  fresh.findings_ = findings_.next_epoch();
-  if (map_.is_given()) fresh.give_map(map_.take());
-  *this = std::move(fresh);
-  findings_.report(situation(), {}, Reason::began_anew, to_seconds(input_.clock_steps().last()));
-}
-
 void Estimator::finish(std::vector<Output>& out) {
   input_.end();
   frames_.end();
@@ -125,7 +128,7 @@ void Estimator::finish(std::vector<Output>& out) {
     ImuSample held = history_.replay().newest_imu();
     held.t = std::max(held.t, frames_.first_end());
     if (held.t > history_.replay().newest_imu().t) history_.add(held);
-    process_frames(held.t, out);
+    while (auto frame = frames_.pop(held.t)) std::visit([&](const auto& what) { process(what, *frame, out); }, frame->what);
     if (outputs_.has_sweep() && history_.now().t < held.t) history_.advance_to(held.t);
   }
   while (!outputs_.empty()) {
@@ -146,12 +149,6 @@ void Estimator::choose_modality(Time t) {
   constexpr double doubt = 0.003;
   if (change == SensorStatus::Change::of_modality && status_.modality() == Modality::coast && frames_.empty())
     history_.inflate_velocity(doubt);
-}
-
-// A sweep or image of a sensor that was lost comes in the middle of an impact: it waits as the legs do, but not for ever.
-bool Estimator::must_settle(Sensor s, Time t) {
-  if (!settles_all_ || !status_.is_missing(s)) return false;
-  return !is_settled(t) && status_.has_waited_less(s, t, std::chrono::seconds(1));
 }
 
 bool Estimator::keep_plausible(bool definite) {
@@ -176,10 +173,6 @@ Findings::Situation Estimator::situation() const {
           legs_.leg_length()};
 }
 
-PoseCovariance Estimator::common_error_at(const State& x) const {
-  return map_.error_at(x.pose()) + lidar_.mount_error_at(x.pose()) + legs_.description_error(x);
-}
-
 void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts, double kinematic_us,
                      double contact_us) {
   Output* const o = outputs_.next(e.t, out);
@@ -187,7 +180,7 @@ void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<
   o->epoch = epoch();
   o->x = e.x;
   o->P = e.P;
-  o->P.topLeftCorner<6, 6>() += common_error_at(e.x);
+  o->P.topLeftCorner<6, 6>() += common_error(map_, lidar_, legs_, e.x);
   if (history_.replay().has_imu()) o->omega = history_.replay().newest_imu().gyro - e.x.bg;
   o->modality = status_.modality();
   o->cause = status_.cause();
@@ -200,7 +193,7 @@ void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<
 
 bool Estimator::fork(LivePropagator& into) const {
   if (!history_.has_begun() || !history_.replay().has_imu()) return false;
-  into.become(history_, legs_, imu_, status_, common_error_at(history_.now().x), epoch());
+  into.become(history_, legs_, imu_, status_, common_error(map_, lidar_, legs_, history_.now().x), epoch());
   return true;
 }
 

@@ -49,6 +49,7 @@ class Estimator {
 
   /// No more measurements will come: what still waits is processed.
   std::vector<Output> finish();
+  void finish(std::vector<Output>& out);
 
   /// Why leg messages like this one cannot be used with this robot, if so: the first of them decides whether a run makes sense.
   std::optional<std::string> mismatch(const JointSample& s) const { return kinematics_ ? kinematics_->mismatch(s) : std::nullopt; }
@@ -70,37 +71,25 @@ class Estimator {
   void drain(std::vector<Output>& out);
   void handle(Measurement m, std::vector<Output>& out);
   void begin(const Start& start, std::vector<Output>& out);
-  void begin_new_epoch(std::vector<Output>& out);
-  void finish(std::vector<Output>& out);
 
   // The asynchronous phase.
   void process(ImuSample s, std::vector<Output>& out);
   void process(const JointSample& s, std::vector<Output>& out);
 
   // The sequential phase.
-  void process_frames(Time until, std::vector<Output>& out);
-  void process(const LidarScan& scan, Time begin, Time end, std::vector<Output>& out);
-  void process(const CameraImage& image);
-  void doubt_acceleration(const LidarScan& scan, Time end, Estimate& prior, Registration& sweep);
-  void refuse_sweep(Reason reason, const Estimate& prior, Time end);
+  void process(const LidarScan& scan, const FrameQueue::Frame& frame, std::vector<Output>& out);
+  void process(const CameraImage& image, const FrameQueue::Frame& frame, std::vector<Output>& out);
 
   // What follows from either.
   void lose_imu(std::vector<Output>& out);
-  void lose_legs(Time t);
   void choose_modality(Time t);
   bool keep_plausible(bool definite = false);  // `definite`: looks at the whole covariance
-  bool is_settled(Time t) const { return settles_nothing_ || imu_.is_calm(t, std::chrono::milliseconds(20)); }
-  bool must_settle(Sensor s, Time t);
   Findings::Situation situation() const;
-  /// What the filter's covariance lacks of the error relative to the first pose: of the map, of the LiDAR's mount, of the legs'
-  /// description.
-  PoseCovariance common_error_at(const State& x) const;
   void emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0,
             double contact_us = 0);
 
   Robot robot_;
   EstimatorConfig config_;
-  bool settles_all_, settles_nothing_;  // of the settings
   InputQueue input_;
   Starter starter_;
   ImuWatch imu_;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <gtest/gtest.h>
 #include <limits>
+#include <random>
 
 #include "lab/simulation/analytic_room.hpp"
 
@@ -98,7 +99,7 @@ TEST(Estimator, BegunOnTheMoveTheSweepsHoldIt) {
   const Replay r = run(small_room(), {}, 1, imu_and_lidar, config);
   expect_sane(r);
   EXPECT_LT(r.worst_position, 0.15) << "the first of them has to find the velocity: without them it is metres";
-  EXPECT_GE(r.statistics.sensors[static_cast<std::size_t>(Sensor::lidar)].used, 40u);
+  EXPECT_GE(r.statistics.sensors[index_of(Sensor::lidar)].used, 40u);
 }
 
 TEST(Estimator, FollowsARoomWithinMillimetresAtImuRate) {
@@ -162,6 +163,28 @@ TEST(Estimator, AGapOfHalfASecondInTheImuIsBridged) {
   const SE3 T_WR = r.outputs.front().x.pose() * room.truth(r.outputs.front().t).inverse();
   last_error = ((T_WR * room.truth(r.outputs.back().t)).p - r.outputs.back().x.p).norm();
   EXPECT_LT(last_error, 0.05);
+}
+
+TEST(Estimator, StandingWithALargeGyroBiasItStaysWhereItIs) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 1);
+  Estimator estimator(Robot{}, {}, {true, false, false, false});
+  double worst = 0, sigma = 0;  // in standard deviations; m
+  for (int i = 0; i < 30 * 200; ++i) {
+    ImuSample s;
+    s.t = Time(std::chrono::milliseconds(5 * i));
+    s.gyro = Eigen::Vector3d(0.03, -0.04, 0) + 1e-3 * Eigen::Vector3d(noise(random), noise(random), noise(random));
+    s.accel = Eigen::Vector3d(0, 0, 9.81) + 0.02 * Eigen::Vector3d(noise(random), noise(random), noise(random));
+    for (const Output& o : estimator.push(s)) {
+      EXPECT_EQ(o.modality, Modality::coast);
+      const Eigen::Vector3d of_axes = o.P.diagonal().segment<3>(at::p).cwiseSqrt();
+      worst = std::max(worst, o.x.p.cwiseAbs().cwiseQuotient(of_axes).maxCoeff());
+      sigma = of_axes.maxCoeff();
+    }
+  }
+  EXPECT_TRUE(estimator.initialised());
+  EXPECT_LT(worst, 3);
+  EXPECT_LT(sigma, 0.1) << "it is known to stand";
 }
 
 TEST(Estimator, WithoutScansItCoastsAndTheCovarianceGrows) {

@@ -48,7 +48,7 @@ void Findings::report(const Situation& now, std::optional<Sensor> sensor, Reason
 
 void Findings::drop(Sensor sensor, Reason reason, const std::string& text) {
   ++of(sensor).dropped[text.empty() ? text_of(reason) : text];
-  ++drops_[static_cast<std::size_t>(sensor)][static_cast<std::size_t>(reason)];
+  ++drops_[index_of(sensor)][static_cast<std::size_t>(reason)];
 }
 
 void Findings::look(Time t, const Situation& now) {
@@ -97,7 +97,7 @@ void Findings::report_clock_steps(const Situation& now, const ClockSteps& steps)
 }
 
 void Findings::report_clock_offset(const Situation& now, Sensor s, double total, double configured) {
-  statistics_.clock_shift[static_cast<std::size_t>(s)] = total;
+  statistics_.clock_shift[index_of(s)] = total;
   report(now, s, Reason::clock_offset, total, std::string(name_of(s)) + ".time_offset to " + decimals(configured + total, 4));
 }
 
@@ -119,10 +119,10 @@ void Findings::report_streams(const Situation& now) {
 
 // A sensor that was there and of little use since `before` is what the user must know of first.
 void Findings::report_use(const Use& before, const Situation& now) {
-  const std::uint64_t legs = statistics_.sensors[static_cast<std::size_t>(Sensor::legs)].used;
+  const std::uint64_t legs = statistics_.sensors[index_of(Sensor::legs)].used;
   const std::uint64_t unsupported = statistics_.unsupported - before.unsupported;
   // Even who runs has a foot on the ground for more than half of the time.
-  if (unsupported > few && 2 * unsupported > legs - before.used[static_cast<std::size_t>(Sensor::legs)]) {
+  if (unsupported > few && 2 * unsupported > legs - before.used[index_of(Sensor::legs)]) {
     const double share = static_cast<double>(statistics_.unsupported) / static_cast<double>(legs);
     events_.state({now.t, Sensor::legs, Reason::feet_not_still, share, 1, {}});
   }
@@ -136,7 +136,7 @@ void Findings::report_use(const Use& before, const Situation& now) {
       events_.state({now.t, static_cast<Sensor>(s), reason, ahead, drops_[s][r], {}});
     }
   }
-  const auto lidar = static_cast<std::size_t>(Sensor::lidar), nowhere = static_cast<std::size_t>(Reason::fits_nowhere);
+  const auto lidar = index_of(Sensor::lidar), nowhere = static_cast<std::size_t>(Reason::fits_nowhere);
   const std::uint64_t refused = drops_[lidar][nowhere] - before.dropped[lidar][nowhere];
   if (!statistics_.diverged && refused > few && refused > statistics_.sensors[lidar].used - before.used[lidar]) {
     contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar, now), static_cast<double>(refused),
@@ -150,6 +150,13 @@ void Findings::report_turned_camera(const Situation& now, const Eigen::Vector3d&
   const Eigen::Vector3d degrees = turned * (180 / M_PI);
   report(now, Sensor::camera, Reason::camera_turned, degrees.norm(),
          tenths(degrees.x()) + ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()));
+}
+
+void Findings::report_new_map(const Situation& now) {
+  ++statistics_.maps_begun_anew;
+  report(now, Sensor::lidar, Reason::map_begun_anew);
+  contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar, now), 2,
+             "for 2 s no sweep fitted the map where it should have been", now);
 }
 
 Sensor Findings::witness_against(Sensor s, const Situation& now) {

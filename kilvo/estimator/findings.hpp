@@ -44,6 +44,8 @@ class Findings {
   void report_clock_offset(const Situation& now, Sensor s, double total, double configured);
   /// The camera seems to be turned by `turned` rad about the axes of the IMU.
   void report_turned_camera(const Situation& now, const Eigen::Vector3d& turned);
+  /// Sweeps had fitted nowhere for so long that the map was begun anew.
+  void report_new_map(const Situation& now);
   /// `a` and `b` cannot both be right.
   void contradict(Reason reason, Sensor a, Sensor b, double value, const std::string& why, const Situation& now);
   /// Which other sensor carried the estimate until now.
@@ -70,7 +72,7 @@ class Findings {
     std::array<std::array<std::uint64_t, reason_count>, sensor_count> dropped{};
     std::uint64_t unsupported = 0;
   };
-  SensorCount& of(Sensor s) { return statistics_.sensors[static_cast<std::size_t>(s)]; }
+  SensorCount& of(Sensor s) { return statistics_.sensors[index_of(s)]; }
   void report_streams(const Situation& now);
   void report_use(const Use& before, const Situation& now);
   void look_at_agreement(Time t, const Situation& now);

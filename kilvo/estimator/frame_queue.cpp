@@ -8,23 +8,23 @@
 namespace kilvo {
 namespace {
 
-// More than two seconds of scans and images are not worth waiting for the IMU.
-constexpr std::size_t most_waiting = 60;
+// More of scans and images is not worth waiting for the IMU.
+constexpr Duration longest_wait = std::chrono::seconds(2);
 
 bool is_scan(const FrameQueue::Frame& f) { return std::holds_alternative<LidarScan>(f.what); }
 
 }  // namespace
 
 std::optional<FrameQueue::Frame> FrameQueue::push(LidarScan scan) {
-  if (!recut_) return insert(std::move(scan));
+  std::vector<LidarScan> scans;
+  if (recut_) scans = recutter_.add(scan);
+  if (!recut_) scans.push_back(std::move(scan));
   std::optional<Frame> crowded_out;
-  for (LidarScan& part : recutter_.add(scan)) crowded_out = insert(std::move(part));
+  for (LidarScan& s : scans) {
+    const Time begin = begin_of(s), end = end_of(s);
+    crowded_out = insert(Frame{std::move(s), begin, end});
+  }
   return crowded_out;
-}
-
-std::optional<FrameQueue::Frame> FrameQueue::insert(LidarScan scan) {
-  const Time begin = begin_of(scan), end = end_of(scan);
-  return insert(Frame{std::move(scan), begin, end});
 }
 
 std::optional<FrameQueue::Frame> FrameQueue::push(CameraImage image) {
@@ -36,7 +36,7 @@ std::optional<FrameQueue::Frame> FrameQueue::push(CameraImage image) {
 std::optional<FrameQueue::Frame> FrameQueue::insert(Frame frame) {
   const auto after = std::ranges::upper_bound(frames_, frame.end, {}, &Frame::end);
   frames_.insert(after, std::move(frame));
-  if (frames_.size() <= most_waiting) return std::nullopt;
+  if (frames_.back().end - frames_.front().end <= longest_wait) return std::nullopt;
   std::optional<Frame> oldest = std::move(frames_.front());
   frames_.pop_front();
   return oldest;

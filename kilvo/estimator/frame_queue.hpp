@@ -46,7 +46,6 @@ class FrameQueue {
 
  private:
   std::optional<Frame> insert(Frame frame);
-  std::optional<Frame> insert(LidarScan scan);
   bool waits_for_scan(Time image, Time until) const;
 
   Duration scan_period_;

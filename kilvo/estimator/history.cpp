@@ -44,11 +44,24 @@ void History::record_from(const Estimate& e, Time until) {
   replay_.advance(ahead, until, &trajectory_);
 }
 
+std::optional<History> History::doubted(Time middle, Time end, std::optional<double> off) const {
+  constexpr double most = 0.5;  // m/s, with which a sweep still has its shape
+  const double since = to_seconds(middle - base_.t), sigma = off.value_or(0) / since;
+  if (end - base_.t > longest_correction || since <= 0 || sigma > most) return std::nullopt;
+  std::optional<History> out(*this);
+  if (!off) {
+    out->replay_.doubt_acceleration(base_);
+  } else {
+    out->base_.P.diagonal().segment<3>(at::v).array() += sigma * sigma;
+    out->replay_.forget_estimates();
+  }
+  return out;
+}
+
 std::optional<History::Motion> History::motion_since(Time t) const {
-  constexpr Duration longest = std::chrono::milliseconds(300);
   if (t >= base_.t) return Motion{};
   const auto then = trajectory_.at(t), at_base = trajectory_.at(base_.t);
-  if (!then || !at_base || base_.t - t > longest) return std::nullopt;
+  if (!then || !at_base || base_.t - t > longest_correction) return std::nullopt;
   return Motion{*then, *at_base};
 }
 
@@ -95,7 +108,6 @@ void History::inflate_velocity(double sigma) {
 }
 
 double History::roll_back() {
-  constexpr double absurd_speed = 30;  // m/s
   // Where the robot went since, nobody knows: about as far as it was going.
   const Time t = std::max(now_.t, good_.t);
   const double lost = to_seconds(t - good_.t);

@@ -34,13 +34,10 @@ class History {
 
   /// The estimate of a time not before the base. What was passed on the way is in the trajectory.
   Estimate at(Time t);
-  /// What the accelerometer reported since the base is wrong. now() and closed() stay what they were.
-  void doubt_acceleration() { replay_.doubt_acceleration(base_); }
-  /// The velocity of the base is less certain than its covariance says, by this standard deviation, m/s. now() and closed() stay as well.
-  void doubt_velocity(double sigma) {
-    base_.P.diagonal().segment<3>(at::v).array() += sigma * sigma;
-    replay_.forget_estimates();
-  }
+  /// For a sweep around `middle` until `end`: the same, but that what the accelerometer reported since the base is wrong; or, if the sweep
+  /// is `off` by so much (m), that the velocity of the base is less certain. None when it was too long ago, or that is too much. Its now()
+  /// and closed() are what they are here.
+  std::optional<History> doubted(Time middle, Time end, std::optional<double> off) const;
   /// Puts the poses from `e` to `until` into the trajectory.
   void record_from(const Estimate& e, Time until);
   /// How the IMU moved from `t` to the base: its poses at both, as the trajectory has them; the same when `t` is not before the base. None
@@ -98,6 +95,8 @@ class History {
   void close_fork(Time until, std::optional<Time> legs);
 
  private:
+  static constexpr Duration longest_correction = std::chrono::milliseconds(300);  // of what is past
+
   Trajectory* record() { return is_fork_ ? nullptr : &trajectory_; }
 
   Replay replay_;

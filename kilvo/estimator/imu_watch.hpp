@@ -21,13 +21,13 @@ class ImuWatch {
 
   /// Brings a sample to m/s^2 and marks what is clipped. Says why it is not to be used.
   std::optional<Reason> prepare(ImuSample& s);
-  /// A sample that is used.
-  void add(const ImuSample& s) { stationarity_.add(s); }
+  /// A sample that is used; what is known of the gyro's bias.
+  void add(const ImuSample& s, const Eigen::Vector3d& gyro_bias) { stationarity_.add(s, gyro_bias); }
   /// The IMU was silent.
   void restart() { stationarity_.restart(); }
 
-  /// The acceleration has been a usual one for at least `hold`: no impact.
-  bool is_calm(Time t, Duration hold) const { return stationarity_.is_usual(t, hold); }
+  /// The acceleration has been a usual one for long enough: no impact.
+  bool is_calm(Time t) const { return stationarity_.is_usual(t, std::chrono::milliseconds(20)); }
 
   /// With no other sensor: the estimate, if the robot looks like one at rest at `s` and this has not been said just now. It does not move,
   /// and up is where the accelerometer says.

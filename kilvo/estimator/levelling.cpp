@@ -7,11 +7,6 @@
 #include "kilvo/math/decompositions.hpp"
 
 namespace kilvo {
-namespace {
-
-constexpr double known = LevelGround::known_vertical;
-
-}  // namespace
 
 void Levelling::add(Output& o) {
   if (R_LW_) return;
@@ -26,7 +21,7 @@ void Levelling::add(Output& o) {
     first_ = o.t;
     first_sigma_ = sigma_;
   }
-  if (!is_settled_ && !(sigma_ < known) && o.t - *first_ <= longest_) return;
+  if (!is_settled_ && !(sigma_ < LevelGround::known_vertical) && o.t - *first_ <= longest_) return;
   if (const auto event = finish()) o.events.push_back(*event);
 }
 

@@ -1,6 +1,5 @@
 #include "kilvo/estimator/live_propagator.hpp"
 
-#include "kilvo/estimator/silence.hpp"
 #include "kilvo/filter/gap.hpp"
 #include "kilvo/input/fault.hpp"
 #include "kilvo/math/stopwatch.hpp"
@@ -8,12 +7,7 @@
 namespace kilvo {
 
 LivePropagator::LivePropagator(const Robot& robot, const EstimatorConfig& config)
-    : leg_rate_(robot.legs.rate),
-      imu_rate_(robot.imu.rate),
-      history_(config),
-      legs_(config.legs),
-      imu_(robot.imu, config.initial),
-      status_(robot, false) {}
+    : history_(config), legs_(config.legs), imu_(robot.imu, config.initial), status_(robot, false) {}
 
 void LivePropagator::become(const History& history, const LegPipeline& legs, const ImuWatch& imu, const SensorStatus& status,
                             const PoseCovariance& common_error, std::uint32_t epoch) {
@@ -25,11 +19,6 @@ void LivePropagator::become(const History& history, const LegPipeline& legs, con
   epoch_ = epoch;
   started_ = true;
   with_legs_ = false;
-}
-
-// Both ends of the IMU's intervals up to the newest sample that is not after `until` are known now.
-void LivePropagator::close(Time until) {
-  history_.close_fork(until, status_.has_legs() ? std::optional(status_.last_legs()) : std::nullopt);
 }
 
 // What is not finite goes nowhere: it is silent until the estimator, which throws such a state away, is forked again.
@@ -47,23 +36,23 @@ bool LivePropagator::push(const ImuSample& raw) {
   if (imu_.prepare(s)) return false;
   history_.add(s);
   // The estimator will report it as well, once it has stopped waiting for them.
-  if (status_.has_legs() && s.t - status_.last_legs() - lag_ > silence_of_legs(leg_rate_)) status_.miss_legs();
+  if (status_.has_legs() && status_.are_legs_silent(s.t - *status_.last_legs() - lag_)) status_.miss_legs();
   if (status_.has_legs() && !status_.are_legs_overdue(s.t - lag_)) return false;
-  close(s.t);
+  history_.close_fork(s.t, status_.last_legs());
   with_legs_ = false;
   return keep_finite();
 }
 
 bool LivePropagator::push(const Feet& feet) {
   if (!started_ || imu_lost()) return false;
-  if (!status_.has_legs() || feet.t <= status_.last_legs() || feet.t < known()) return false;
-  if (to_seconds(feet.t - history_.replay().newest_imu().t) > longest_held_imu(imu_rate_)) return false;
-  if (feet.t - status_.last_legs() > silence_of_legs(leg_rate_)) {
+  if (!status_.has_legs() || feet.t <= *status_.last_legs() || feet.t < known()) return false;
+  if (status_.is_imu_missing(feet.t - history_.replay().newest_imu().t)) return false;
+  if (status_.are_legs_silent(feet.t - *status_.last_legs())) {
     status_.lose_legs(true);  // they come again: how, the estimator decides
     return false;
   }
   Stopwatch watch;
-  close(feet.t);
+  history_.close_fork(feet.t, status_.last_legs());
   if (feet.t < history_.now().t) return false;
   status_.legs_used(feet.t);
   history_.predict_to(feet.t);

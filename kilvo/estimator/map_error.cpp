@@ -74,19 +74,11 @@ void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epo
   const PoseCovariance inverse = inverse_of_known(A);
   const PoseCovariance G = from_origin(T_WI);
   PoseCovariance root = PoseCovariance::Zero();
-  for (const EpochInformation& e : epochs) root += inverse * e.A * root_of(G * epochs_[e.epoch] * G.transpose());
+  for (const EpochInformation& e : epochs) {
+    if (e.epoch < epochs_.size()) root += inverse * e.A * root_of(G * epochs_[e.epoch] * G.transpose());
+  }
   const PoseCovariance H = to_origin(T_WI);
   now_ = H * (root * root.transpose() + inverse * systematic * inverse + weak * at(T_WI) * weak.transpose()) * H.transpose();
-}
-
-void MapError::registered_to_given(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic,
-                                   const PoseCovariance& weak) {
-  PoseCovariance A = PoseCovariance::Zero();
-  for (const EpochInformation& e : epochs) A += e.A;
-  if (!(A.topLeftCorner<3, 3>().trace() > 0) || !(A.bottomRightCorner<3, 3>().trace() > 0)) return;
-  const PoseCovariance inverse = inverse_of_known(A);
-  const PoseCovariance H = to_origin(T_WI);
-  now_ = H * (inverse * systematic * inverse + weak * at(T_WI) * weak.transpose()) * H.transpose();
 }
 
 void MapError::seen(const SE3& T_WI, std::span<const EarlierView> views, const PoseCovariance& weak) {

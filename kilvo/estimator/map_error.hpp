@@ -25,12 +25,8 @@ class MapError {
   /// A sweep was registered with these informations against planes of each epoch; D becomes what their errors do to the pose. They
   /// are taken as fully correlated, which bounds it from above. Along directions that the sweep did not know (`weak`: a pose error
   /// to its part along them) D stays what it was.
-  /// `systematic`: LidarModel::systematic().
+  /// `systematic`: LidarModel::systematic(). Planes of no epoch (of a map that was given) are where they should be.
   void registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic, const PoseCovariance& weak);
-
-  /// The same with a map that was given, whose planes are where they should be. `systematic`: LidarModel::systematic().
-  void registered_to_given(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic,
-                           const PoseCovariance& weak);
 
   /// The map begins anew at a pose that is wrong by so much more: nothing ties it to the one before.
   void lost(const SE3& T_WI, const PoseCovariance& more);

@@ -26,18 +26,18 @@ void Replay::inflate_for_missed(ImuInterval& interval, double gap) const {
 
 // Beyond the end of its range an IMU may have seen anything of the same size.
 void Replay::inflate_for_clipping(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
-  constexpr double gyro = 3, accel = 20, correlation = 0.01;  // rad/s, m/s^2: what may be missing; s: for so long
+  constexpr double missing_gyro = 3, missing_accel = 20, correlation = 0.01;  // rad/s, m/s^2; s: for so long
   const auto scale = [](double missing, double noise) { return missing * missing * correlation / (noise * noise); };
-  if (a.gyro_clipped || b.gyro_clipped) interval.gyro_scale = scale(gyro, config_.noise.gyro);
-  if (a.accel_clipped || b.accel_clipped) interval.accel_scale = scale(accel, config_.noise.accel);
+  if (a.gyro_clipped || b.gyro_clipped) interval.gyro_scale = scale(missing_gyro, config_.noise.gyro);
+  if (a.accel_clipped || b.accel_clipped) interval.accel_scale = scale(missing_accel, config_.noise.accel);
 }
 
 // No body turns or is pushed so much within one sample: one of the two is wrong in all that it says, or little is known of between.
 void Replay::inflate_for_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
-  constexpr double gyro = 3, accel = 100;  // rad/s, m/s^2
+  constexpr double largest_turn = 3, largest_push = 100;  // rad/s, m/s^2
   const double dt = to_seconds(b.t - a.t), turned = (b.gyro - a.gyro).norm(), pushed = (b.accel - a.accel).norm();
   const auto scale = [dt](double jump, double noise) { return jump * jump * dt / (noise * noise); };
-  if (turned <= gyro && pushed <= accel) return;
+  if (turned <= largest_turn && pushed <= largest_push) return;
   interval.gyro_scale = std::max(interval.gyro_scale, scale(turned, config_.noise.gyro));
   interval.accel_scale = std::max(interval.accel_scale, scale(pushed, config_.noise.accel));
 }
@@ -95,7 +95,7 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   const ProcessNoise noise = noise_now();
   const auto step = [&](ImuInterval interval) {
     // What was missed or clipped is in no mean.
-    interval.made_biases = is_of_rest(interval.end) && interval.gyro_scale == 1 && interval.accel_scale == 1;
+    interval.made_biases = rest_until_ && interval.end <= *rest_until_ && interval.gyro_scale == 1 && interval.accel_scale == 1;
     if (interval.begin < sweep_noise_.until) {
       interval.gyro_scale *= 1 - sweep_noise_.rotation;
       interval.velocity_scale *= 1 - sweep_noise_.position;
@@ -122,14 +122,9 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
 
 std::optional<Eigen::Vector3d> Replay::gyro_at(Time t) const {
   const auto next = std::lower_bound(imu_.begin(), imu_.end(), t, [](const ImuSample& s, Time value) { return s.t < value; });
-  if (next == imu_.end()) {
-    if (to_seconds(t - imu_.back().t) > longest_gap()) return std::nullopt;
-    return imu_.back().gyro;
-  }
-  if (next == imu_.begin() || next->t == t) return next->gyro;
-  const ImuSample& a = *(next - 1);
-  if (to_seconds(next->t - a.t) > longest_gap()) return std::nullopt;
-  return a.gyro + (to_seconds(t - a.t) / to_seconds(next->t - a.t)) * (next->gyro - a.gyro);
+  const bool is_told = next != imu_.end() && (next == imu_.begin() || next->t == t);
+  if (!is_told && to_seconds((next == imu_.end() ? t : next->t) - (next - 1)->t) > longest_gap()) return std::nullopt;
+  return imu_at(t).gyro;
 }
 
 ImuSample Replay::imu_at(Time t) const {
@@ -257,8 +252,7 @@ const Estimate& Replay::nearest(Time t, const Estimate& oldest) const {
 }
 
 void Replay::doubt_acceleration(const Estimate& base) {
-  remembered_.clear();
-  taken_.clear();
+  forget_estimates();
   usual_.accel_density2 = usual_.accel_bend2 = 0;  // they were of what is wrong
   for (ImuSample& s : imu_) {
     if (s.t <= base.t) continue;
@@ -268,8 +262,7 @@ void Replay::doubt_acceleration(const Estimate& base) {
 }
 
 void Replay::forget_before(Time t) {
-  remembered_.clear();
-  taken_.clear();
+  forget_estimates();
   while (imu_.size() > 2 && imu_[1].t <= t) imu_.pop_front();
   while (steps_.size() > 1 && steps_[1].t <= t) steps_.pop_front();
 }

@@ -83,8 +83,7 @@ class Replay {
   void copy_since(Time t, const Replay& other);
   void clear_steps() {
     steps_.clear();
-    taken_.clear();
-    remembered_.clear();
+    forget_estimates();
   }
 
  private:
@@ -96,7 +95,6 @@ class Replay {
     Gain<LegModel::max_leg_rows> gain;
   };
 
-  bool is_of_rest(Time end) const { return rest_until_ && end <= *rest_until_; }
   LegModel::Used apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept = nullptr) const;
   bool retrace(Estimate& e, const Estimate& live, Time until, Trajectory* record) const;
   void inflate_for_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "kilvo/estimator/replay.hpp"
+#include "kilvo/filter/gap.hpp"
 
 namespace kilvo {
 
@@ -25,7 +26,7 @@ void Replay::note_usual(const ImuSample& s) {
   usual_.period += (std::clamp(dt, 0.5 * usual_.period, 1.5 * usual_.period) - usual_.period) / 64;
   if (imu_.size() < 2) return;
   const ImuSample& a = imu_[imu_.size() - 2];
-  if (to_seconds(s.t - a.t) > 2.5 * usual_.period) return;
+  if (to_seconds(s.t - a.t) > periods_of_a_gap * usual_.period) return;
   const double part = to_seconds(b.t - a.t) / to_seconds(s.t - a.t);
   const double gyro2 = (b.gyro - a.gyro - part * (s.gyro - a.gyro)).squaredNorm() / 3;
   const double accel2 = (b.accel - a.accel - part * (s.accel - a.accel)).squaredNorm() / 3;
@@ -38,7 +39,7 @@ void Replay::note_usual(const ImuSample& s) {
   usual_.accel_density2 += count * (white * accel2 * dt - usual_.accel_density2);
 }
 
-double Replay::longest_gap() const { return std::max(config_.max_imu_gap, 2.5 * usual_.period); }
+double Replay::longest_gap() const { return std::max(config_.max_imu_gap, periods_of_a_gap * usual_.period); }
 
 // What varies faster than the rate of the IMU is folded into it. As far as it is more than the settings say, a part of it stays in the
 // integral: the samples that follow do not take it all back.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 
 #include "kilvo/estimator/modality.hpp"
 #include "kilvo/input/health.hpp"
@@ -14,9 +15,12 @@ namespace kilvo {
 
 class SensorStatus {
  public:
-  /// `with_lidar`: the LiDAR is to be used.
-  SensorStatus(const Robot& robot, bool with_lidar)
-      : rates_{robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate}, with_lidar_(with_lidar) {}
+  /// `with_lidar`: the LiDAR is to be used. `settling`: see EstimatorConfig.
+  SensorStatus(const Robot& robot, bool with_lidar, std::string_view settling = "legs")
+      : rates_{robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate},
+        with_lidar_(with_lidar),
+        settles_all_(settling == "all"),
+        settles_nothing_(settling == "none") {}
 
   /// The first estimate is of `t`. `legs`: they are taken as there until they stay silent.
   void begin(Time t, bool legs);
@@ -30,22 +34,24 @@ class SensorStatus {
   /// They are lost, and nothing else is asked about: who runs ahead cannot know why.
   void miss_legs();
   bool has_legs() const { return last_legs_.has_value(); }
-  Time last_legs() const { return *last_legs_; }
+  std::optional<Time> last_legs() const { return last_legs_; }
   /// End of the last sweep that was used, or the start.
   Time last_sweep() const { return last_sweep_; }
 
   /// The legs have been silent for so long, or say the same for so long, that they count as lost. `imu_heard`: the newest IMU sample
   /// before this one; where the IMU was silent as well, nobody can say it.
   bool are_legs_lost(Time imu_heard, const Health& health) const;
+  bool are_legs_silent(Duration since) const;
   /// While the legs are used their samples carry the outputs, unless one comes so late that the IMU's must.
   bool are_legs_overdue(Time t) const;
+  /// Legs so long after the newest IMU sample are no odometry.
+  bool is_imu_missing(Duration since) const;
   /// Legs that come again in the middle of an impact would start with wrong contacts (paper, Section IV-E), and which foot stands is told
   /// by what is still, for which the velocity must be known: whether those of `t` may be used, or have waited for long enough.
   bool may_legs_return(Time t, bool is_calm, bool is_velocity_known, const Health& health);
 
-  /// Sweeps or images have been used and are lost. `has_waited_less`: since this was first asked about.
-  bool is_missing(Sensor s) const;
-  bool has_waited_less(Sensor s, Time t, Duration longest);
+  /// A sweep or image of a sensor that was lost comes in the middle of an impact: it waits as the legs do, but not for ever.
+  bool may_frame_return(Sensor s, Time t, bool is_calm);
 
   /// From now on there is no pose, or there is one again.
   void lose_imu(const Health& health);
@@ -61,16 +67,16 @@ class SensorStatus {
 
  private:
   Reason cause_of_change(Time t, Modality now, const Health& health) const;
-  double rate_of(Sensor s) const { return rates_[static_cast<std::size_t>(s)]; }
+  double rate_of(Sensor s) const { return rates_[index_of(s)]; }
+  bool has_waited(Sensor s, Time t);
 
   std::array<double, sensor_count> rates_;  // Hz, by Sensor
-  bool with_lidar_;
+  bool with_lidar_, settles_all_, settles_nothing_;
   Time last_sweep_{};
   std::optional<Time> last_image_;
   std::optional<Time> last_legs_;                              // while the legs are used
   double leg_period_ = 0;                                      // between the last two leg samples, s
-  std::optional<Time> legs_wait_;                              // since when leg messages come again that are not used yet
-  std::array<std::optional<Time>, sensor_count> frames_wait_;  // the same of sweeps and images
+  std::array<std::optional<Time>, sensor_count> waits_since_;  // by Sensor: since when messages come again that are not used yet
   bool legs_were_there_ = false, sweeps_were_there_ = false;
   bool imu_lost_ = false;
   Modality modality_ = Modality::coast;

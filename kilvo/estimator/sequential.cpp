@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "kilvo/estimator/estimator.hpp"
+#include "kilvo/filter/gap.hpp"
 #include "kilvo/math/stopwatch.hpp"
 
 namespace kilvo {
@@ -18,25 +19,13 @@ std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE
   return out;
 }
 
-// An offset of the LiDAR's clock below this is of no consequence, s.
-constexpr double least_offset = 5e-4;
-
 }  // namespace
 
-void Estimator::process_frames(Time until, std::vector<Output>& out) {
-  while (auto frame = frames_.pop(until)) {
-    if (const auto* scan = std::get_if<LidarScan>(&frame->what)) {
-      process(*scan, frame->begin, frame->end, out);
-    } else {
-      process(std::get<CameraImage>(frame->what));
-    }
-  }
-}
-
-void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector<Output>& out) {
+void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, std::vector<Output>& out) {
+  const Time begin = frame.begin, end = frame.end;
   if (end < history_.base().t) return findings_.drop(Sensor::lidar, Reason::before_state);
   if (history_.replay().is_blind(begin, end)) return findings_.drop(Sensor::lidar, Reason::no_imu);
-  if (must_settle(Sensor::lidar, end)) return findings_.drop(Sensor::lidar, Reason::not_calm);
+  if (!status_.may_frame_return(Sensor::lidar, end, imu_.is_calm(end))) return findings_.drop(Sensor::lidar, Reason::not_calm);
   if (frames_.last_middle()) lidar_.note_silence(begin - status_.last_sweep());
   Stopwatch watch;
   // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
@@ -46,14 +35,20 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
   history_.record_from(prior, end);
   if (!lidar_.has_shape(end, prior)) return findings_.drop(Sensor::lidar, Reason::before_motion);
   Statistics& statistics = findings_.statistics();
-  const PoseCovariance map_error = map_.error_at(prior.x.pose());
   const bool first = map_.surfaces().empty();
-  Registration sweep = lidar_.measure(scan, end, prior, history_.trajectory(), map_.surfaces(), map_error, statistics.points);
-  const bool is_surprised = lidar_.is_surprised(prior, sweep, map_error);
-  if (sweep.refused == Reason::fits_nowhere || is_surprised) doubt_acceleration(scan, end, prior, sweep);
+  const Registration sweep = map_.register_sweep(lidar_, scan, end, history_, prior, statistics.points);
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
-  if (sweep.refused) return refuse_sweep(*sweep.refused, prior, end);
+  if (sweep.refused) {
+    findings_.drop(Sensor::lidar, *sweep.refused);
+    if (sweep.refused != Reason::fits_nowhere) return;
+    history_.resume(prior);
+    if (map_.refuse_sweep(lidar_, prior, end)) {
+      if (vision_) vision_->forget_map();
+      findings_.report_new_map(situation());
+    }
+    return history_.advance_to(end);
+  }
   if (config_.lidar.least_ratio > 0 && eigenvalue_ratio(sweep.points) < config_.lidar.least_ratio)
     return findings_.drop(Sensor::lidar, Reason::agrees_with_nothing);
   history_.resume(sweep.posterior);
@@ -63,7 +58,7 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
 
   const SE3 T_WI = history_.now().x.pose();
   if (good) {
-    const auto clock = lidar_.compare_turns(prior, sweep.posterior, history_.trajectory(), begin, end, least_offset);
+    const auto clock = lidar_.compare_turns(prior, sweep.posterior, history_.trajectory(), begin, end);
     if (clock.doubtful && vision_) vision_->restart_mount_check();  // it may see nothing but this
     if (clock.offset)
       findings_.report_clock_offset(situation(), Sensor::lidar, input_.shift_by(Sensor::lidar, *clock.offset), robot_.lidar.time_offset);
@@ -71,7 +66,7 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
     lidar_.accept(sweep);
     if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior);
     if (first) map_.begin_at(sweep.posterior.x.pose(), legs_.description_error(sweep.posterior.x));
-    map_.learn(sweep, lidar_.unobservable(), lidar_.may_learn(prior, sweep, map_error));
+    map_.learn(sweep, lidar_.unobservable(), lidar_.may_learn(prior, sweep, map_.error_at(prior.x.pose())));
     history_.rebase(sweep.posterior);
   }
   result.stages.map_us = watch.lap_us();
@@ -94,59 +89,17 @@ void Estimator::process(const LidarScan& scan, Time begin, Time end, std::vector
   if (!status_.has_legs()) emit(history_.now(), out);
 }
 
-// The sweep is not where it should be for what the accelerometer reported. Where the prior is uncertain for that alone, it fits where
-// nothing has pushed the robot; where it fits, a push was not what was reported, and the velocity that it gave is not known.
-void Estimator::doubt_acceleration(const LidarScan& scan, Time end, Estimate& prior, Registration& sweep) {
-  constexpr Duration longest = std::chrono::milliseconds(300);
-  const double since = to_seconds(prior.t - history_.base().t);
-  if ((sweep.refused && !sweep.searched) || end - history_.base().t > longest || since <= 0) return;
-  History doubted = history_;
-  if (sweep.refused) {
-    doubted.doubt_acceleration();
-  } else {
-    constexpr double most = 0.5;  // m/s, with which a sweep still has its shape
-    const double off = (sweep.posterior.x.p - prior.x.p).norm() / since;
-    if (off > most) return;
-    doubted.doubt_velocity(off);
-  }
-  const Estimate expected = doubted.at(prior.t);
-  doubted.record_from(expected, end);
-  PointDrops counted;
-  const PoseCovariance map_error = map_.error_at(expected.x.pose());
-  Registration again = lidar_.measure(scan, end, expected, doubted.trajectory(), map_.surfaces(), map_error, counted);
-  if (again.refused || !again.carries || (!sweep.refused && !LidarPipeline::agrees(expected, again, map_error))) return;
-  history_ = std::move(doubted);
-  prior = expected;
-  sweep = std::move(again);
-}
-
-// A sweep that fits nowhere is not used; when that has lasted, the robot is taken to be outside of the map: it begins anew around it.
-void Estimator::refuse_sweep(Reason reason, const Estimate& prior, Time end) {
-  findings_.drop(Sensor::lidar, reason);
-  if (reason != Reason::fits_nowhere) return;
-  history_.resume(prior);
-  if (lidar_.refuse(end, map_.is_given())) {
-    map_.begin_anew(prior);
-    if (vision_) vision_->forget_map();
-    ++findings_.statistics().maps_begun_anew;
-    findings_.report(situation(), Sensor::lidar, Reason::map_begun_anew);
-    findings_.contradict(Reason::diverged, Sensor::lidar, Findings::witness_against(Sensor::lidar, situation()), 2,
-                         "for 2 s no sweep fitted the map where it should have been", situation());
-  }
-  history_.advance_to(end);
-}
-
-void Estimator::process(const CameraImage& image) {
+void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std::vector<Output>&) {
   const auto refuse = [this](Reason r) { findings_.drop(Sensor::camera, r); };
   if (const auto reason = vision_->refuses(image.t)) return refuse(*reason);
   const auto motion = history_.motion_since(image.t);
   if (!motion) return refuse(Reason::before_state);
   if (history_.replay().is_blind(image.t, image.t)) return refuse(Reason::no_imu);
   // Vision lives by the surfaces of the LiDAR: without it, nobody can tell what hides what, and images can only drift.
-  constexpr double scans = 3.5;
-  if (image.t - frames_.last_middle().value_or(Time{}) > from_seconds(scans / robot_.lidar.rate)) return refuse(Reason::no_lidar);
+  const Duration half_scan = from_seconds(0.5 / robot_.lidar.rate);
+  if (is_silence(image.t - frames_.last_middle().value_or(Time{}) - half_scan, robot_.lidar.rate)) return refuse(Reason::no_lidar);
   if (lidar_.is_rejoining()) return refuse(Reason::before_rejoined);
-  if (must_settle(Sensor::camera, image.t)) return refuse(Reason::not_calm);
+  if (!status_.may_frame_return(Sensor::camera, image.t, imu_.is_calm(image.t))) return refuse(Reason::not_calm);
   Stopwatch watch;
   ImageContext context;
   context.prior = history_.at(std::max(image.t, history_.base().t));
@@ -177,7 +130,7 @@ void Estimator::process(const CameraImage& image) {
   if (const auto offset = vision_->clock_offset())
     findings_.report_clock_offset(situation(), Sensor::camera, input_.shift_by(Sensor::camera, *offset), robot_.camera.time_offset);
   if (seen.carries) status_.image_used(image.t);
-  result.indicators = indicators_of(seen.used);
+  result.indicators = indicators_of(seen.used, seen.carries);
   result.stages.visual_us = watch.lap_us();
   outputs_.add_image(std::move(result));
 }

@@ -22,11 +22,12 @@ std::optional<Start> Starter::add(Measurement m) {
 
 // Images are large, and only those of the still window will be of use.
 void Starter::bound_images() {
-  constexpr int most = 8;
-  const auto is_image = [](const Measurement& m) { return std::holds_alternative<CameraImage>(m); };
-  if (!is_image(kept_.back()) || std::ranges::count_if(kept_, is_image) <= most) return;
-  kept_.erase(std::ranges::find_if(kept_, is_image));
-  dropped_.push_back(Sensor::camera);
+  const auto* image = std::get_if<CameraImage>(&kept_.back());
+  if (image == nullptr) return;
+  const auto is_old = [oldest = image->t - 2 * still_time_](const Measurement& m) {
+    return std::holds_alternative<CameraImage>(m) && stamp_of(m) < oldest;
+  };
+  dropped_.insert(dropped_.end(), std::erase_if(kept_, is_old), Sensor::camera);
 }
 
 }  // namespace kilvo

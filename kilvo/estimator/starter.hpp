@@ -15,7 +15,9 @@ namespace kilvo {
 class Starter {
  public:
   explicit Starter(const EstimatorConfig& config)
-      : initialiser_(config.initial, config.gravity_align, config.noise.accel), moving_start_(config.initial.moving_start) {}
+      : initialiser_(config.initial, config.gravity_align, config.noise.accel),
+        moving_start_(config.initial.moving_start),
+        still_time_(from_seconds(config.initial.still_time)) {}
 
   /// In time order. The start, as soon as there is one.
   std::optional<Start> add(Measurement m);
@@ -33,6 +35,7 @@ class Starter {
 
   Initialiser initialiser_;
   double moving_start_;  // s
+  Duration still_time_;
   std::deque<Measurement> kept_;
   std::vector<Sensor> dropped_;
 };

@@ -9,18 +9,41 @@ void WorldMap::give(VoxelMap map) {
 
 void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservable, bool may_grow) {
   const SE3 T_WI = sweep.posterior.x.pose();
-  if (is_given_) {
-    if (sweep.carries) error_.registered_to_given(T_WI, sweep.by_epoch, sweep.systematic, unobservable);
-    return;
-  }
-  if (!may_grow) return;
-  if (sweep.carries) error_.registered(T_WI, sweep.by_epoch, sweep.systematic, unobservable);
+  if (sweep.carries && (is_given_ || may_grow)) error_.registered(T_WI, sweep.by_epoch, sweep.systematic, unobservable);
+  if (is_given_ || !may_grow) return;
   const std::uint32_t epoch = error_.epoch_now(T_WI, sweep.posterior.P.topLeftCorner<6, 6>());
   lidar_.range_noise = sweep.range_noise;
   const std::vector<PointGroup> seen = to_world(sweep.clusters, T_WI, p_IL_, lidar_);
   surfaces_.insert(seen, epoch);
   surfaces_.see_through(T_WI * p_IL_, seen);
   surfaces_.forget(sweep.posterior.x.p);
+}
+
+// Where the prior is uncertain for what the accelerometer reported alone, the sweep fits where nothing has pushed the robot; where it fits,
+// a push was not what was reported, and the velocity that it gave is not known.
+Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, History& history, Estimate& prior,
+                                      PointDrops& drops) const {
+  const PoseCovariance error = error_at(prior.x.pose());
+  Registration sweep = lidar.measure(scan, end, prior, history.trajectory(), surfaces_, error, drops);
+  const bool is_surprised = lidar.is_surprised(prior, sweep, error);
+  if ((sweep.refused != Reason::fits_nowhere && !is_surprised) || (sweep.refused && !sweep.searched)) return sweep;
+  auto doubted = history.doubted(prior.t, end, sweep.refused ? std::nullopt : std::optional((sweep.posterior.x.p - prior.x.p).norm()));
+  if (!doubted) return sweep;
+  const Estimate expected = doubted->at(prior.t);
+  doubted->record_from(expected, end);
+  PointDrops counted;
+  const PoseCovariance error_there = error_at(expected.x.pose());
+  Registration again = lidar.measure(scan, end, expected, doubted->trajectory(), surfaces_, error_there, counted);
+  if (again.refused || !again.carries || (!sweep.refused && !LidarPipeline::agrees(expected, again, error_there))) return sweep;
+  history = std::move(*doubted);
+  prior = expected;
+  return again;
+}
+
+bool WorldMap::refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time end) {
+  if (!lidar.refuse(end, is_given_)) return false;
+  begin_anew(prior);
+  return true;
 }
 
 void WorldMap::begin_anew(const Estimate& e) {

@@ -1,6 +1,7 @@
 // The map that sweeps are registered to, with how wrong it is itself.
 #pragma once
 
+#include "kilvo/estimator/history.hpp"
 #include "kilvo/estimator/map_error.hpp"
 #include "kilvo/lidar/lidar_pipeline.hpp"
 #include "kilvo/map/voxel_map.hpp"
@@ -22,6 +23,14 @@ class WorldMap {
   /// Covariance of a pose there from the map's own error, see MapError.
   PoseCovariance error_at(const SE3& T_WI) const { return error_.at(T_WI); }
   const MapError& error() const { return error_; }
+
+  /// Registers a sweep until `end` from `prior`, of its middle. Where it is not for what the accelerometer reported, that is doubted: then
+  /// `history` and `prior` become what they are without. `drops`: counts the points that are not used.
+  Registration register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, History& history, Estimate& prior,
+                              PointDrops& drops) const;
+  /// A sweep fitted nowhere. True when that has lasted: the robot is taken to be outside of the map, and it begins anew around `prior`,
+  /// unless it was given.
+  bool refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time end);
 
   /// A sweep was registered, and its posterior is used. `may_grow`: what it saw becomes part of the map, with how uncertain the pose was.
   /// `unobservable`: takes a pose error to its part along what the sweep did not know.

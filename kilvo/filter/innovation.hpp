@@ -11,13 +11,14 @@
 
 namespace kilvo {
 
+/// Offsets of a clock that are smaller are of no consequence, s.
+inline constexpr double least_clock_offset = 5e-4;
+/// A wrong clock or mount is so many times what the innovations show (1.2 to 7): the state follows the measurements.
+inline constexpr double usual_loss = 1.5;
+
 /// Squared distance per degree of freedom of the pose that `info` speaks of, linearised at the prior, from that of the prior of covariance
 /// `P`. None when it does not hold all of the pose. The columns of `info` begin with those of the pose.
-template <int N>
-std::optional<double> normalised_innovation(const Information<N>& info, const Covariance& P);
-
-extern template std::optional<double> normalised_innovation(const Information<6>&, const Covariance&);
-extern template std::optional<double> normalised_innovation(const Information<7>&, const Covariance&);
+std::optional<double> normalised_innovation(const Information<7>& info, const Covariance& P);
 
 /// By how much the variance of a sensor's measurements exceeds what they say, learnt from their innovations.
 class InnovationScale {

@@ -36,7 +36,7 @@ TEST(Innovation, ShowsAnErrorThatTheMeasurementDoesNotKnowOf) {
 }
 
 TEST(Innovation, HasNoneWithoutThePose) {
-  Information<6> info;
+  Information<7> info;
   EXPECT_FALSE(normalised_innovation(info, Covariance::Identity()));
 }
 

@@ -13,6 +13,9 @@ namespace kilvo {
 template <int Max>
 using Residual = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Max, 1>;
 
+/// Beyond this many standard deviations a row's pull stays the same (Huber): what moved, edges, what is not as it was.
+inline constexpr double robust_sigmas = 1.5;
+
 /// Few rows: residual r, Jacobian H over the whole error state, covariance R of the rows. At most `Max` rows; no allocation.
 template <int Max>
 struct Rows {

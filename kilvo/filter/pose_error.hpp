@@ -2,6 +2,8 @@
 // far apart have in common are the same twist.
 #pragma once
 
+#include <cstdint>
+
 #include "kilvo/filter/state.hpp"
 
 namespace kilvo {
@@ -11,6 +13,12 @@ struct EarlierView {
   PoseCovariance error;  // of that pose, as a twist at the world's origin
   double distance = 0;   // from there, m
   double weight = 0;     // how much of the measurement comes from it; only ratios matter
+};
+
+/// What measurements against one epoch of the map (VoxelMap::insert) know about the pose.
+struct EpochInformation {
+  std::uint32_t epoch = 0;
+  PoseCovariance A = PoseCovariance::Zero();
 };
 
 /// (theta in the body, error of p) -> twist: phi = R theta, u = dp + p x phi.

@@ -1,5 +1,7 @@
 #include "kilvo/filter/state.hpp"
 
+#include <Eigen/Cholesky>
+
 namespace kilvo {
 
 State boxplus(const State& x, const ErrorVector& d) {
@@ -36,6 +38,17 @@ bool is_finite(const Estimate& e) {
   return e.x.R.matrix().allFinite() && e.x.p.allFinite() && e.x.v.allFinite() && e.x.bg.allFinite() && e.x.ba.allFinite() &&
          e.x.g.allFinite() && e.x.pc[0].allFinite() && e.x.pc[1].allFinite() && std::isfinite(e.x.tau) &&
          (0 * e.P).sum() == 0;  // zero times what is not finite is not a number
+}
+
+bool is_plausible(const Estimate& e) {
+  constexpr double absurd_sigma = 1e4, rounding = 1e-12;  // m
+  return is_finite(e) && e.x.v.norm() < absurd_speed && e.P.diagonal().minCoeff() > -rounding &&
+         e.P.diagonal().segment<3>(at::p).maxCoeff() < absurd_sigma * absurd_sigma;
+}
+
+bool is_definite(const Covariance& P) {
+  constexpr double rounding = 1e-9;
+  return P.ldlt().vectorD().minCoeff() > -rounding;
 }
 
 }  // namespace kilvo

@@ -50,4 +50,13 @@ struct Estimate {
 
 bool is_finite(const Estimate& e);
 
+/// m/s: beyond it nothing walks.
+inline constexpr double absurd_speed = 30;
+
+/// Finite, at a speed that a walking machine may have, with variances that are none of a state that has lost itself.
+bool is_plausible(const Estimate& e);
+
+/// Whether a covariance has no negative direction, but for rounding: what is known exactly, and feet that do not stand, have no variance.
+bool is_definite(const Covariance& P);
+
 }  // namespace kilvo

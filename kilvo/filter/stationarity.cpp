@@ -3,12 +3,6 @@
 #include <algorithm>
 
 namespace kilvo {
-namespace {
-
-constexpr double statistics_time = 2.0;  // s
-constexpr double block = 0.25;           // s
-
-}  // namespace
 
 void StationarityDetector::restart() {
   begin_.reset();
@@ -16,18 +10,18 @@ void StationarityDetector::restart() {
   quiet_blocks_ = 0;
 }
 
-void StationarityDetector::close_block() {
+void StationarityDetector::close_block(const Eigen::Vector3d& gyro_bias) {
   const Eigen::Vector3d gyro = gyro_ / n_, accel = accel_ / n_;
   const Eigen::Vector3d gyro_sigma = (gyro2_ / n_ - gyro.cwiseAbs2()).cwiseMax(0).cwiseSqrt();
   const Eigen::Vector3d accel_sigma = (accel2_ / n_ - accel.cwiseAbs2()).cwiseMax(0).cwiseSqrt();
   constexpr double largest_rate = 0.03, largest_change = 0.01;  // rad/s
-  const bool quiet = n_ > 5 && gyro_sigma.maxCoeff() < still_gyro_ && accel_sigma.maxCoeff() < still_accel_ && gyro.norm() < largest_rate &&
-                     (quiet_blocks_ == 0 || (gyro - resting_gyro_).norm() < largest_change);
+  const bool quiet = n_ > 5 && gyro_sigma.maxCoeff() < still_gyro_ && accel_sigma.maxCoeff() < still_accel_ &&
+                     (gyro - gyro_bias).norm() < largest_rate && (quiet_blocks_ == 0 || (gyro - resting_gyro_).norm() < largest_change);
   quiet_blocks_ = quiet ? quiet_blocks_ + 1 : 0;
   resting_gyro_ = gyro;
 }
 
-void StationarityDetector::add(const ImuSample& s) {
+void StationarityDetector::add(const ImuSample& s, const Eigen::Vector3d& gyro_bias) {
   if (!begin_) {
     begin_ = s.t;
     n_ = 0;
@@ -40,7 +34,8 @@ void StationarityDetector::add(const ImuSample& s) {
   accel2_ += s.accel.cwiseAbs2();
   const double dt = last_ ? std::clamp(to_seconds(s.t - *last_), 0.0, 0.1) : 0.0;
   last_ = s.t;
-  constexpr double least_variance = 1e-4;  // (m/s^2)^2
+  constexpr double statistics_time = 2.0, block = 0.25;  // s
+  constexpr double least_variance = 1e-4;                // (m/s^2)^2
   if (mean_.isZero(0)) mean_ = s.accel;
   const Eigen::Vector3d off = s.accel - mean_;
   const double d_a = (off.array().abs() / (variance_.array() + least_variance).sqrt()).sum();
@@ -52,7 +47,7 @@ void StationarityDetector::add(const ImuSample& s) {
     usual_since_ = s.t;
   }
   if (to_seconds(s.t - *begin_) < block) return;
-  close_block();
+  close_block(gyro_bias);
   begin_.reset();
 }
 

@@ -16,7 +16,8 @@ class StationarityDetector {
   StationarityDetector(double still_gyro, double still_accel, double theta)
       : still_gyro_(still_gyro), still_accel_(still_accel), theta_(theta) {}
 
-  void add(const ImuSample& s);
+  /// `gyro_bias`: as far as it is known; what is left of the mean rate is motion.
+  void add(const ImuSample& s, const Eigen::Vector3d& gyro_bias);
   void restart();
   /// The IMU has looked like one of a standing robot for at least half a second.
   bool stands() const { return quiet_blocks_ >= 2; }
@@ -24,7 +25,7 @@ class StationarityDetector {
   bool is_usual(Time t, Duration hold) const { return usual_since_ && t - *usual_since_ >= hold; }
 
  private:
-  void close_block();
+  void close_block(const Eigen::Vector3d& gyro_bias);
 
   double still_gyro_, still_accel_, theta_;
   std::optional<Time> begin_, last_, usual_since_;

@@ -30,10 +30,22 @@ TEST(StationarityDetector, StandsAfterHalfASecondOfRestAndNotInMotion) {
   for (const bool moving : {false, true}) {
     StationarityDetector detector(0.03, 0.4, 10);
     const auto samples = stream(moving, 150);
-    for (int i = 0; i < 90; ++i) detector.add(samples[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < 90; ++i) detector.add(samples[static_cast<std::size_t>(i)], Eigen::Vector3d::Zero());
     EXPECT_FALSE(detector.stands());
-    for (int i = 90; i < 150; ++i) detector.add(samples[static_cast<std::size_t>(i)]);
+    for (int i = 90; i < 150; ++i) detector.add(samples[static_cast<std::size_t>(i)], Eigen::Vector3d::Zero());
     EXPECT_EQ(detector.stands(), !moving);
+  }
+}
+
+TEST(StationarityDetector, AKnownGyroBiasIsNoMotionAndAnUnknownOneIs) {
+  const Eigen::Vector3d bias(0.03, -0.04, 0);
+  for (const bool known : {false, true}) {
+    StationarityDetector detector(0.03, 0.4, 10);
+    for (ImuSample s : stream(false, 150)) {
+      s.gyro += bias;
+      detector.add(s, known ? bias : Eigen::Vector3d::Zero());
+    }
+    EXPECT_EQ(detector.stands(), known);
   }
 }
 
@@ -43,7 +55,7 @@ TEST(StationarityDetector, TakesAnImpactForUnusualAndForgetsIt) {
   const auto add = [&](int i, double z) {
     s.t = at_seconds(0.005 * i);
     s.accel = {0.1 * std::sin(0.9 * i), 0.1 * std::cos(1.3 * i), z + 0.2 * std::sin(0.5 * i)};
-    detector.add(s);
+    detector.add(s, Eigen::Vector3d::Zero());
   };
   for (int i = 0; i < 600; ++i) add(i, 9.8);
   EXPECT_TRUE(detector.is_usual(s.t, std::chrono::milliseconds(20)));

@@ -28,7 +28,6 @@ class Trajectory {
   void correct(Time t, const SE3& corrected, const Eigen::Vector3d& dv_W);
 
   void clear() { entries_.clear(); }
-  bool empty() const { return entries_.empty(); }
   std::size_t size() const { return entries_.size(); }
   Time oldest() const { return entries_.front().t; }
   Time newest() const { return entries_.back().t; }

@@ -116,7 +116,7 @@ TEST(Trajectory, ACorrectionOutsideOfItDoesNothing) {
 TEST(Trajectory, ClearedItIsEmpty) {
   Trajectory trajectory = trajectory_along({}, 0, 100, 5);
   trajectory.clear();
-  EXPECT_TRUE(trajectory.empty());
+  EXPECT_EQ(trajectory.size(), 0U);
   EXPECT_FALSE(trajectory.at(at_ms(50)));
 }
 

@@ -4,13 +4,15 @@
 #include <cmath>
 #include <utility>
 
+#include "kilvo/input/timeline.hpp"
+
 namespace kilvo {
 namespace {
 
 // What goes back by less has come late.
 constexpr Duration least_step = std::chrono::milliseconds(15);
-// So many samples in a row show that the time stays where it went; fewer, when so many messages of the others say so too.
-constexpr int witnesses = 10, few_witnesses = 3, votes = 3;
+// So many samples in a row show that the time stays where it went, when so many messages of the others say so too.
+constexpr int few_witnesses = 3, votes = 3;
 // Beyond, the robot need not be where it was: nothing is remembered for so long.
 constexpr Duration longest_step = std::chrono::seconds(2);
 // Samples that follow each other are no farther apart.
@@ -28,7 +30,7 @@ double distance(Duration a, Duration b) { return std::abs(to_seconds(a) - to_sec
 }  // namespace
 
 std::optional<Reason> ClockSteps::follow_imu(Time t) {
-  Duration& offset = offset_[static_cast<std::size_t>(Sensor::imu)];
+  Duration& offset = offset_[index_of(Sensor::imu)];
   const Time now = t + offset;
   const bool near = !imu_ || (now > *imu_ - least_step && now < *imu_ + longest_interval);
   const bool alone_ahead = imu_ && now > *imu_ + least_step && has_run_ahead(now);
@@ -55,9 +57,9 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
   const bool back = now < *imu_;
   const bool with_others = for_ >= votes && for_ > against_, alone = against_ >= votes && against_ > for_ && legs_spacing_ < often;
   const bool seconded = elsewhere_ >= few_witnesses && (alone || (back && with_others));
-  if (back && !seconded && (elsewhere_ < witnesses || !is_sure())) return Reason::clock_back;
-  if (alone_ahead && !seconded && elsewhere_ < witnesses) return Reason::clock_forward;
-  if (!back && !alone_ahead && elsewhere_ < witnesses) return std::nullopt;
+  if (back && !seconded && (elsewhere_ < clock_witnesses || !is_sure())) return Reason::clock_back;
+  if (alone_ahead && !seconded && elsewhere_ < clock_witnesses) return Reason::clock_forward;
+  if (!back && !alone_ahead && elsewhere_ < clock_witnesses) return std::nullopt;
   const int there = std::exchange(elsewhere_, 0);
   // Ahead with all the others, it is a gap, or a mistake: the timeline looks into that.
   if (!back && !(alone_ahead && seconded)) return note_hole(first_there_), imu_ = now, std::nullopt;
@@ -121,28 +123,21 @@ void ClockSteps::vote(std::size_t s, Time t) {
   ++(with_it < without_it ? for_ : against_);
 }
 
-void ClockSteps::put(Measurement& m, std::size_t s) const {
-  std::visit([&](auto& x) { x.t += offset_[s]; }, m);
-}
-
 std::optional<Reason> ClockSteps::follow(Measurement& m) {
   const Sensor sensor = sensor_of(m);
-  const auto s = static_cast<std::size_t>(sensor);
+  const auto s = index_of(sensor);
   const Time t = stamp_of(m);
   if (t < earliest || t > latest) return Reason::absurd_stamp;
-  if (sensor == Sensor::imu) {
-    const auto fault = follow_imu(t);
-    if (!fault || fault == Reason::time_jump) put(m, s);
-    return fault;
-  }
+  std::optional<Reason> fault;
+  if (sensor == Sensor::imu) fault = follow_imu(t);
   if (sensor == Sensor::legs) {
     const Time now = t + offset_[s];
     if (legs_ && now > *legs_) legs_spacing_ = std::min(now - *legs_, legs_spacing_ + legs_spacing_ / 8);
     legs_ = now;
   }
-  if (imu_ && elsewhere_ == 0) {
+  if (sensor != Sensor::imu && imu_ && elsewhere_ == 0) {
     // Of the IMU's clock, or of one of its own that did not step: the messages come as long after the IMU's as ever.
-    const Duration imu_offset = offset_[static_cast<std::size_t>(Sensor::imu)];
+    const Duration imu_offset = offset_[index_of(Sensor::imu)];
     const Duration stays = *imu_ - (t + offset_[s]), steps = *imu_ - (t + imu_offset);
     const Duration usual = lag_[s].value_or(steps);
     if (open_[s] && !open_until_[s]) open_until_[s] = *imu_ + patience;
@@ -152,10 +147,11 @@ std::optional<Reason> ClockSteps::follow(Measurement& m) {
     constexpr double most = 0.05;  // s; one message that is late by hours is not to be followed
     lag_[s] = usual + from_seconds(std::clamp(to_seconds(lag) - to_seconds(usual), -most, most) / 10);
     newest_[s] = std::max(newest_[s].value_or(t + offset_[s]), t + offset_[s]);
-  } else if (imu_) {
+  } else if (sensor != Sensor::imu && imu_) {
     vote(s, t);
   }
-  return put(m, s), std::nullopt;
+  if (!fault || fault == Reason::time_jump) std::visit([&](auto& x) { x.t += offset_[s]; }, m);
+  return fault;
 }
 
 }  // namespace kilvo

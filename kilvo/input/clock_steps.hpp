@@ -37,7 +37,6 @@ class ClockSteps {
   void note_hole(Time until) { holes_[next_hole_++ % holes_.size()] = {*imu_, until}; }
   bool is_late(Time now) const;
   void restart(Time imu);
-  void put(Measurement& m, std::size_t s) const;
   void vote(std::size_t s, Time t);
 
   std::array<Duration, sensor_count> offset_{};  // added to the stamps, by Sensor

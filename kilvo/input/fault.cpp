@@ -25,8 +25,11 @@ std::optional<Reason> fault_of(const JointSample& s) {
   return when(beyond(s.position, absurd_position) || beyond(s.velocity, absurd_velocity), Reason::absurd_value);
 }
 
-std::optional<Reason> fault_of(const LidarScan& s) { return when(s.points.empty(), Reason::empty); }
-
-std::optional<Reason> fault_of(const CameraImage& s) { return when(s.image.empty(), Reason::empty); }
+std::optional<Reason> fault_of(const Measurement& m) {
+  if (const auto* scan = std::get_if<LidarScan>(&m)) return when(scan->points.empty(), Reason::empty);
+  if (const auto* image = std::get_if<CameraImage>(&m)) return when(image->image.empty(), Reason::empty);
+  const auto* imu = std::get_if<ImuSample>(&m);
+  return imu != nullptr ? fault_of(*imu) : fault_of(std::get<JointSample>(m));
+}
 
 }  // namespace kilvo

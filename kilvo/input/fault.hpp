@@ -11,10 +11,6 @@ namespace kilvo {
 /// What is wrong with a measurement by itself; none: nothing.
 std::optional<Reason> fault_of(const ImuSample& s);
 std::optional<Reason> fault_of(const JointSample& s);
-std::optional<Reason> fault_of(const LidarScan& s);
-std::optional<Reason> fault_of(const CameraImage& s);
-inline std::optional<Reason> fault_of(const Measurement& m) {
-  return std::visit([](const auto& s) { return fault_of(s); }, m);
-}
+std::optional<Reason> fault_of(const Measurement& m);
 
 }  // namespace kilvo

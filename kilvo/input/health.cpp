@@ -11,8 +11,6 @@ namespace {
 
 // A measurement cannot have been taken so much later than the newest of the IMU, which arrives at once, s.
 constexpr double most_ahead = 0.25, witnessed_ahead = 0.12;
-// Stamps farther apart than this are of a clock that has jumped.
-constexpr Duration jump = std::chrono::seconds(1);
 // The clocks are compared over so long, s.
 constexpr double clock_window = 0.05;
 // So many messages without a repetition show that a sensor is alive and noisy: only then does sameness mean anything.
@@ -126,10 +124,10 @@ std::optional<Reason> Health::judge_repeats(const Measurement& m, StreamHealth& 
 // The IMU is the clock. A stamp may lie ahead of it because the IMU is silent or late, with all others; or because that clock is wrong:
 // then the IMU's messages have kept coming between those of the sensor.
 bool Health::is_ahead(Sensor s, Time t, StreamHealth& stream, Tracker& tracker) {
-  const auto& imu = trackers_[static_cast<std::size_t>(Sensor::imu)].stamp;
-  const double rate = rates_[static_cast<std::size_t>(s)];
+  const auto& imu = trackers_[index_of(Sensor::imu)].stamp;
+  const double rate = rates_[index_of(s)];
   const auto window = static_cast<std::uint64_t>(std::max(1.0, clock_window * rate));
-  const std::uint64_t heard = streams_[static_cast<std::size_t>(Sensor::imu)].messages;
+  const std::uint64_t heard = streams_[index_of(Sensor::imu)].messages;
   ++tracker.since;
   const double expected = 0.5 * static_cast<double>(tracker.since + tracker.before) * rates_[0] / rate;
   const bool imu_speaks = static_cast<double>(heard - tracker.imu_before) >= expected && heard > tracker.imu_before;
@@ -146,7 +144,7 @@ bool Health::is_ahead(Sensor s, Time t, StreamHealth& stream, Tracker& tracker) 
   // All others ahead alike: it is the IMU that comes late. If none is, they are witnesses.
   int others = 0, ahead = 0;
   for (std::size_t k = 1; k < sensor_count; ++k) {
-    if (k == static_cast<std::size_t>(s) || !trackers_[k].stamp) continue;
+    if (k == index_of(s) || !trackers_[k].stamp) continue;
     ++others;
     ahead += to_seconds(*trackers_[k].stamp - *imu) > 0.5 * witnessed_ahead ? 1 : 0;
   }
@@ -158,6 +156,7 @@ bool Health::is_ahead(Sensor s, Time t, StreamHealth& stream, Tracker& tracker) 
 
 void Health::watch_imu(const Measurement& m) {
   if (const auto* imu = std::get_if<ImuSample>(&m)) {
+    imu_ = *imu;
     imu_silence_ = 0;
     for (Tracker& tracker : trackers_) tracker.heard_since_imu.reset();
     const double share = std::min(1.0, 1.0 / (still_memory * rates_[0]));
@@ -169,10 +168,9 @@ void Health::watch_imu(const Measurement& m) {
   Tracker& tracker = trackers_[m.index()];
   if (!tracker.heard_since_imu) tracker.heard_since_imu = tracker.stamp;
   // What is older than the newest IMU sample has come late, unless its clock is another.
-  constexpr Duration another_clock = std::chrono::seconds(1);
   Time since = *tracker.heard_since_imu;
-  const auto& imu = trackers_[static_cast<std::size_t>(Sensor::imu)].stamp;
-  if (imu && *imu > since && *imu - since < another_clock) since = *imu;
+  const auto& imu = trackers_[index_of(Sensor::imu)].stamp;
+  if (imu && *imu > since && *imu - since < clock_jump) since = *imu;
   imu_silence_ = std::max(imu_silence_, std::min(1.0, to_seconds(*tracker.stamp - since)));
 }
 
@@ -182,17 +180,12 @@ std::optional<Reason> Health::judge(const Measurement& m) {
   Tracker& tracker = trackers_[m.index()];
   const Time t = completion_of(m);
   // Duplicates and what comes late, between newer ones, are the timeline's business.
-  if (tracker.stamp && t <= *tracker.stamp && *tracker.stamp - t < jump) return std::nullopt;
-  if (const auto same = judge_repeats(m, stream, tracker)) {
+  if (tracker.stamp && t <= *tracker.stamp && *tracker.stamp - t < clock_jump) return std::nullopt;
+  auto refused = judge_repeats(m, stream, tracker);
+  if (!refused && s != Sensor::imu && is_ahead(s, t, stream, tracker)) refused = Reason::clock_ahead;
+  if (refused) {
     ++stream.messages;
-    return same;
-  }
-  if (s != Sensor::imu && is_ahead(s, t, stream, tracker)) {
-    ++stream.messages;
-    return Reason::clock_ahead;
-  }
-  if (const auto* imu = std::get_if<ImuSample>(&m)) {
-    imu_ = *imu;
+    return refused;
   }
   time(stream, tracker, t);
   watch_imu(m);

@@ -32,12 +32,12 @@ class Health {
   std::optional<Reason> judge(const Measurement& m);
 
   /// Of a sample at the end of the IMU's range; how many there were.
-  std::uint64_t count_clipped() { return ++streams_[static_cast<std::size_t>(Sensor::imu)].clipped; }
+  std::uint64_t count_clipped() { return ++streams_[index_of(Sensor::imu)].clipped; }
 
   const std::array<StreamHealth, sensor_count>& streams() const { return streams_; }
   /// The newest stamp of a sensor.
-  std::optional<Time> heard(Sensor s) const { return trackers_[static_cast<std::size_t>(s)].stamp; }
-  bool is_frozen(Sensor s) const { return trackers_[static_cast<std::size_t>(s)].frozen; }
+  std::optional<Time> heard(Sensor s) const { return trackers_[index_of(s)].stamp; }
+  bool is_frozen(Sensor s) const { return trackers_[index_of(s)].frozen; }
   /// How long the others have been speaking since the IMU did last, s: in arrival order, so that a constant delay is no silence.
   double imu_silence() const { return imu_silence_; }
 

@@ -42,7 +42,7 @@ void InputQueue::admit(Measurement m, std::optional<Reason> off_clock) {
   if (const auto fault = fault_of(m)) return refuse(s, *fault);
   if (off_clock) return refuse(s, *off_clock);
   if (const auto fault = health_.judge(m)) return refuse(s, *fault);
-  const Duration by = shift_[static_cast<std::size_t>(s)];
+  const Duration by = shift_[index_of(s)];
   if (auto* scan = std::get_if<LidarScan>(&m)) scan->t += by;
   if (auto* image = std::get_if<CameraImage>(&m)) image->t += by;
   if (const auto refused = timeline_.push(std::move(m))) refuse(s, *refused);
@@ -52,7 +52,7 @@ void InputQueue::admit(Measurement m, std::optional<Reason> off_clock) {
 
 double InputQueue::shift_by(Sensor s, double by) {
   constexpr double longest = 0.2;  // s
-  Duration& shift = shift_[static_cast<std::size_t>(s)];
+  Duration& shift = shift_[index_of(s)];
   const double total = std::clamp(to_seconds(shift) + by, -longest, longest);
   shift = from_seconds(total);
   return total;

@@ -48,15 +48,13 @@ void Timeline::end() {
 }
 
 std::optional<Reason> Timeline::push(Measurement m) {
-  constexpr Duration jump = std::chrono::seconds(1);
-  constexpr std::size_t witnesses = 10;
   const Time key = completion_of(m);
-  if (!newest_of_all_ || key - *newest_of_all_ <= jump) {
+  if (!newest_of_all_ || key - *newest_of_all_ <= clock_jump) {
     give_up_suspects();
     return admit(std::move(m), key);
   }
   suspects_.push_back(std::move(m));
-  if (suspects_.size() < witnesses) return std::nullopt;
+  if (suspects_.size() < clock_witnesses) return std::nullopt;
   for (Measurement& suspect : std::exchange(suspects_, {})) {
     const Time suspect_key = completion_of(suspect);
     const Sensor sensor = sensor_of(suspect);
@@ -67,9 +65,9 @@ std::optional<Reason> Timeline::push(Measurement m) {
 
 std::optional<Reason> Timeline::admit(Measurement m, Time key) {
   const Time stamp = stamp_of(m);
-  const auto s = static_cast<std::size_t>(sensor_of(m));
-  if (stamp_[s] == stamp) return Reason::duplicate;
   const Sensor sensor = sensor_of(m);
+  const std::size_t s = index_of(sensor);
+  if (stamp_[s] == stamp) return Reason::duplicate;
   if (sensor == Sensor::imu && !first_imu_) first_imu_ = key;
   if (sensor == Sensor::legs) note_legs(key);
   // What is fused at its own time may come after others.
@@ -97,10 +95,10 @@ std::optional<Reason> Timeline::admit(Measurement m, Time key) {
 
 // Whoever speaks again is waited for again, and for as long as it takes, even if this message is too late.
 void Timeline::note_legs(Time key) {
-  const auto& imu = newest_[static_cast<std::size_t>(Sensor::imu)];
+  const auto& imu = newest_[index_of(Sensor::imu)];
   legs_lag_ -= legs_lag_ / 4096;
   if (imu) legs_lag_ = std::clamp(*imu - key, legs_lag_, max_wait_);
-  auto& newest = newest_[static_cast<std::size_t>(Sensor::legs)];
+  auto& newest = newest_[index_of(Sensor::legs)];
   if (released_ && key < *released_) newest = std::max(newest.value_or(key), key);
 }
 
@@ -109,15 +107,14 @@ void Timeline::bound(std::size_t s) {
   if (static_cast<Sensor>(s) == Sensor::imu) return;
   const auto is_of = [s](const auto& entry) { return static_cast<std::size_t>(std::get<Sensor>(entry.first)) == s; };
   for (auto oldest = waiting_.begin(); oldest != waiting_.end();) {
+    // Nothing that waits is older than what waits at the front.
+    if (bytes_[s] <= most_bytes && *newest_[s] - std::get<Time>(oldest->first) <= longest_wait) return;
     if (!is_of(*oldest)) {
-      // Nothing that waits is older than what waits at the front.
-      if (bytes_[s] <= most_bytes && *newest_[s] - std::get<Time>(oldest->first) <= longest_wait) return;
       ++oldest;
       continue;
     }
     const std::size_t size = bytes_of(oldest->second);
-    const bool is_only = bytes_[s] == size;
-    if (is_only || (bytes_[s] <= most_bytes && *newest_[s] - std::get<Time>(oldest->first) <= longest_wait)) return;
+    if (bytes_[s] == size) return;  // it is the only one
     bytes_[s] -= size;
     given_up_.push_back(static_cast<Sensor>(s));
     oldest = waiting_.erase(oldest);
@@ -133,36 +130,24 @@ void Timeline::note_spacing(std::size_t s, Time key) {
 
 // Something may come of this sensor that must go before.
 bool Timeline::is_awaited(std::size_t s, Time key) const {
-  switch (static_cast<Sensor>(s)) {
-    case Sensor::legs: {
-      // Who has been silent for long, or was never there, is not waited for.
-      const auto& now = newest_[static_cast<std::size_t>(Sensor::imu)];
-      if (now && first_imu_ && !newest_[s] && *now - *first_imu_ > never) return false;
-      if (now && newest_[s] && *now - *newest_[s] > std::max(silence, 5 * spacing_[s]) + legs_lag_) return false;
-      return !newest_[s] || *newest_[s] < key;
-    }
-    case Sensor::imu:
-      return !newest_[s] || *newest_[s] < key;
-    case Sensor::camera:
-      if (!wait_for_images_) return false;
-      break;
-    case Sensor::lidar:
-      break;
-  }
-  // Who has been silent for long is not waited for.
-  const auto& imu = newest_[static_cast<std::size_t>(Sensor::imu)];
-  if (imu && newest_[s] && *imu - *newest_[s] > std::max(max_wait_, 3 * spacing_[s])) return false;
-  // A message that comes so much sooner than the one before is fused late, no more.
-  return !newest_[s] || *newest_[s] + 7 * spacing_[s] / 10 < key;
+  const auto sensor = static_cast<Sensor>(s);
+  if (sensor == Sensor::camera && !wait_for_images_) return false;
+  const bool is_frame = sensor == Sensor::lidar || sensor == Sensor::camera;
+  const auto& imu = newest_[index_of(Sensor::imu)];
+  // Who has been silent for long, or was never there, is not waited for.
+  const Duration longest = is_frame ? std::max(max_wait_, 3 * spacing_[s]) : std::max(silence, 5 * spacing_[s]) + legs_lag_;
+  if (sensor != Sensor::imu && imu && newest_[s] && *imu - *newest_[s] > longest) return false;
+  if (sensor == Sensor::legs && imu && first_imu_ && !newest_[s] && *imu - *first_imu_ > never) return false;
+  // A frame that comes so much sooner than the one before is fused late, no more.
+  return !newest_[s] || *newest_[s] + (is_frame ? 7 * spacing_[s] / 10 : Duration(0)) < key;
 }
 
 bool Timeline::may_go(Time key) const {
   // The IMU, which everything needs, is the clock: one sensor that is ahead of it must not make all others late. If it is silent, so much
   // may gather and no more.
   constexpr std::size_t most = 5000;
-  const auto& imu = newest_[static_cast<std::size_t>(Sensor::imu)];
-  const bool waited =
-      expected_[static_cast<std::size_t>(Sensor::imu)] ? imu && *imu - key >= max_wait_ : *newest_of_all_ - key >= max_wait_;
+  const auto& imu = newest_[index_of(Sensor::imu)];
+  const bool waited = expected_[index_of(Sensor::imu)] ? imu && *imu - key >= max_wait_ : *newest_of_all_ - key >= max_wait_;
   if (ended_ || waited || waiting_.size() > most) return true;
   for (std::size_t s = 0; s < sensor_count; ++s) {
     if (expected_[s] && is_awaited(s, key)) return false;

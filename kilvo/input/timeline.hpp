@@ -24,6 +24,10 @@ Time completion_of(const Measurement& m);
 Time begin_of(const LidarScan& scan);
 Time end_of(const LidarScan& scan);
 
+/// Stamps farther apart than this are of a clock that has jumped; so many in a row that agree with each other show that time really has.
+inline constexpr Duration clock_jump = std::chrono::seconds(1);
+inline constexpr int clock_witnesses = 10;
+
 class Timeline {
  public:
   Timeline(std::array<bool, sensor_count> expected, Duration max_wait, bool wait_for_images = true)

@@ -72,7 +72,7 @@ class CellTable {
   const std::vector<Cell>& cells() const { return cells_; }
 
  private:
-  static constexpr std::uint32_t empty = 0xffffffff;
+  static constexpr std::uint32_t empty = VoxelIndex::none;
   std::size_t home(VoxelKey key) const { return (key * 0x9E3779B97F4A7C15ULL) >> 32 & mask_; }
   std::uint32_t begin_cell(std::size_t slot, VoxelKey key, const Float4& p) {
     const auto index = static_cast<std::uint32_t>(cells_.size());
@@ -175,7 +175,7 @@ constexpr std::size_t block = 256;  // points
 
 // The keys of four points at a time; `count` is a multiple of four.
 KILVO_WIDE void keys_of(const float* points, std::size_t count, const Grid& grid, VoxelKey* keys) {
-  constexpr std::int64_t low_bits = (1LL << 21) - 1;
+  constexpr std::int64_t low_bits = (1LL << key_bits) - 1;
   const Eigen::Matrix3d& R = grid.R;
   for (std::size_t i = 0; i < count; i += 4, points += 16) {
     Float4 a, b, c, d;
@@ -192,7 +192,7 @@ KILVO_WIDE void keys_of(const float* points, std::size_t count, const Grid& grid
     for (int k = 0; k < 3; ++k) {
       Long4 cell;
       floor_of(R(k, 0) * x + (R(k, 1) * y + R(k, 2) * z) + grid.t[k], cell);
-      key |= (cell & low_bits) << (21 * k);
+      key |= (cell & low_bits) << (key_bits * k);
     }
     for (std::size_t j = 0; j < 4; ++j) keys[i + j] = static_cast<VoxelKey>(key[j]);
   }

@@ -4,14 +4,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "kilvo/filter/gap.hpp"
+#include "kilvo/filter/innovation.hpp"
 #include "kilvo/filter/update.hpp"
 #include "kilvo/lidar/relocate.hpp"
 
 namespace kilvo {
 namespace {
 
-// After an outage so many sweeps in a row must agree with what was expected before the map grows again.
-constexpr int consistent_sweeps = 3;
 // Sweeps that fitted nowhere for so long: the robot is where the map is not.
 constexpr Duration longest_refusal = std::chrono::seconds(2);
 // Less than this share of a sweep's clusters on known surfaces: it says little of whether the map is the right one.
@@ -25,8 +25,9 @@ constexpr double six_at_99_9 = 22.46;
 bool says_enough(const RegistrationReport& report) { return report.matched >= fewest_rows && report.degeneracy.weak_count <= most_weak; }
 
 // A scan that was undistorted with a velocity that is not known: its ends are out of place, at the worst all on one side.
-PoseCovariance noise_of_velocity(const Covariance& P) {
-  constexpr double half_scan = 0.05, on_one_side = 0.5, per_metre = 0.3;  // s, -, rad/m
+PoseCovariance noise_of_velocity(const Covariance& P, double rate) {
+  constexpr double on_one_side = 0.5, per_metre = 0.3;  // -, rad/m
+  const double half_scan = 0.5 / rate;                  // s
   const double smear = half_scan * half_scan * P.diagonal().segment<3>(at::v).maxCoeff();
   PoseCovariance out = PoseCovariance::Zero();
   out.diagonal().head<3>().setConstant(per_metre * per_metre * smear);
@@ -60,8 +61,7 @@ bool LidarPipeline::has_shape(Time end, const Estimate& prior) const {
 }
 
 void LidarPipeline::note_silence(Duration silence) {
-  constexpr int periods = 4;
-  if (silence > from_seconds(periods / mount_.rate)) sweeps_to_go_ = std::max(sweeps_to_go_, consistent_sweeps);
+  if (is_silence(silence, mount_.rate)) sweeps_to_go_ = std::max(sweeps_to_go_, consistent_sweeps);
 }
 
 Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory,
@@ -107,7 +107,7 @@ Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estim
 void LidarPipeline::track(const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out) const {
   UpdateConfig patient = update_;
   if (is_rejoining()) patient.max_iterations *= 3;
-  const PoseCovariance noise = is_rejoining() ? within_scan.V + noise_of_velocity(prior.P) : within_scan.V;
+  const PoseCovariance noise = is_rejoining() ? within_scan.V + noise_of_velocity(prior.P, mount_.rate) : within_scan.V;
   const auto measured = [&](const State& x, const Covariance& P) {
     Information<6> info = model(x, P);
     add_common_noise(noise, info);
@@ -129,7 +129,7 @@ void LidarPipeline::search(const VoxelMap& map, const Estimate& prior, LidarMode
   }
   rejoin();
   constexpr double found_rotation = 0.006, found_position = 0.005;  // rad, m
-  PoseCovariance guessed = within_scan.V + noise_of_velocity(prior.P);
+  PoseCovariance guessed = within_scan.V + noise_of_velocity(prior.P, mount_.rate);
   guessed.diagonal().head<3>().array() += found_rotation * found_rotation;
   guessed.diagonal().tail<3>().array() += found_position * found_position;
   const auto measured = [&](const State& x, const Covariance&) {
@@ -187,10 +187,8 @@ bool LidarPipeline::refuse(Time t, bool map_is_given) {
   return true;
 }
 
-void LidarPipeline::rejoin() { sweeps_to_go_ = consistent_sweeps; }
-
 LidarPipeline::ClockEvidence LidarPipeline::compare_turns(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory,
-                                                          Time begin, Time end, double least) {
+                                                          Time begin, Time end) {
   const auto first = trajectory.at(begin), last = trajectory.at(end);
   if (!first || !last || end <= begin || is_blind_somewhere() || is_rejoining()) {
     mount_error_.restart();
@@ -199,7 +197,7 @@ LidarPipeline::ClockEvidence LidarPipeline::compare_turns(const Estimate& prior,
   if (config_.mount_error) mount_error_.add(prior.t, posterior.x.R, trajectory);
   const Eigen::Vector3d rate = (first->R.inverse() * last->R).Log() / to_seconds(end - begin);
   time_offset_.add((prior.x.R.inverse() * posterior.x.R).Log(), rate);
-  const ClockEvidence out = {time_offset_.is_doubtful(), time_offset_.offset(least)};
+  const ClockEvidence out = {time_offset_.is_doubtful(), time_offset_.offset(least_clock_offset)};
   if (out.offset) time_offset_.restart();
   return out;
 }

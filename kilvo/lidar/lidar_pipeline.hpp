@@ -73,7 +73,7 @@ class LidarPipeline {
   /// begin anew; never when it `is_given`.
   bool refuse(Time t, bool map_is_given);
   /// The pose is not known any more: some consistent sweeps must come before the map grows again.
-  void rejoin();
+  void rejoin() { sweeps_to_go_ = consistent_sweeps; }
   bool is_rejoining() const { return sweeps_to_go_ > 0; }
 
   /// What the sweeps' turning against the gyro's says of the LiDAR's clock.
@@ -81,9 +81,8 @@ class LidarPipeline {
     bool doubtful = false;         // it may be off: nothing that goes with it is to be judged
     std::optional<double> offset;  // s, to be added to the stamps from now on
   };
-  /// Before accept(): a sweep from `begin` to `end` turned the state from `prior` to `posterior`. An offset of less than `least` s is none.
-  ClockEvidence compare_turns(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory, Time begin, Time end,
-                              double least);
+  /// Before accept(): a sweep from `begin` to `end` turned the state from `prior` to `posterior`.
+  ClockEvidence compare_turns(const Estimate& prior, const Estimate& posterior, const Trajectory& trajectory, Time begin, Time end);
   /// Covariance of a pose there from a mount that is not quite as described, see MountError.
   PoseCovariance mount_error_at(const SE3& T_WI) const { return mount_error_.at(T_WI); }
 
@@ -92,6 +91,8 @@ class LidarPipeline {
   bool is_blind_somewhere() const { return !unobservable_.isZero(0); }
 
  private:
+  static constexpr int consistent_sweeps = 3;
+
   void track(const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out) const;
   void search(const VoxelMap& map, const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out);
 

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "kilvo/filter/epoch_information.hpp"
 #include "kilvo/filter/measurement_rows.hpp"
+#include "kilvo/filter/pose_error.hpp"
 #include "kilvo/lidar/degeneracy.hpp"
 #include "kilvo/lidar/downsample.hpp"
 #include "kilvo/lidar/lidar_config.hpp"

@@ -27,13 +27,12 @@ double pull_of_noise(const Eigen::Vector3d& n, const Eigen::Vector3d& beam, doub
 
 PoseCovariance LidarModel::systematic() const {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
-  constexpr std::uint32_t none = 0xffffffff;
   struct OfPlane {
     Vector6 pull = Vector6::Zero();  // of its own error on b
     OuterSum bumps;
     int rows = 0;
   };
-  std::vector<std::uint32_t> index_of_node(map_.node_capacity(), none);
+  std::vector<std::uint32_t> index_of_node(map_.node_capacity(), VoxelIndex::none);
   std::vector<OfPlane> planes;
   planes.reserve(associations_.size() / 2);
   Vector6 pull = Vector6::Zero();
@@ -41,7 +40,7 @@ PoseCovariance LidarModel::systematic() const {
     const Association& a = associations_[i];
     if (a.plane == nullptr) continue;
     std::uint32_t& index = index_of_node[a.node];
-    if (index == none) {
+    if (index == VoxelIndex::none) {
       index = static_cast<std::uint32_t>(planes.size());
       planes.emplace_back();
     }

@@ -106,37 +106,28 @@ std::vector<Candidate> best_of(std::vector<Candidate> all) {
   return out;
 }
 
-// The registration from a pose of the grid: first with wide gates, then with narrow ones, which judge it.
-struct GridRegistration {
-  const VoxelMap& map;
-  std::span<const PointCluster> clusters;
-  const Eigen::Vector3d& p_IL;
-  const LidarConfig& config;
-  const Workers& workers;
-
-  FoundPose from(const Estimate& expected, const SE3& T_WI) const {
-    Estimate e = expected;
-    e.x.R = T_WI.R;
-    e.x.p = T_WI.p;
-    FoundPose out;
-    for (const auto& [position, rotation] : {std::pair(0.2, 0.06), std::pair(0.06, 0.02), std::pair(0.02, 0.006)}) {
-      e.P.setZero();
-      e.P.diagonal().segment<3>(at::R).array() = rotation * rotation;
-      e.P.diagonal().segment<3>(at::p).array() = position * position;
-      LidarModel model(map, clusters, p_IL, PoseCovariance::Zero(), config, workers);
-      UpdateConfig patient;
-      patient.max_iterations = 10;
-      const Covariance gate = e.P;
-      e = update(e, model, patient).posterior;
-      LidarModel judge(map, clusters, p_IL, PoseCovariance::Zero(), config, workers);
-      out.info = judge(e.x, 0.25 * gate);
-      const RegistrationReport& report = judge.report();
-      out.share = report.matched < fewest_rows_found ? 0 : static_cast<double>(report.matched) / (report.matched + report.rejected);
-    }
-    out.x = e.x;
-    return out;
+// The registration from a pose of the grid: first with wide gates, then with narrow ones, which judge it. `model` makes one.
+template <class Model>
+FoundPose registered_from(Estimate e, const SE3& T_WI, const Model& model) {
+  e.x.R = T_WI.R;
+  e.x.p = T_WI.p;
+  FoundPose out;
+  for (const auto& [position, rotation] : {std::pair(0.2, 0.06), std::pair(0.06, 0.02), std::pair(0.02, 0.006)}) {
+    e.P.setZero();
+    e.P.diagonal().segment<3>(at::R).array() = rotation * rotation;
+    e.P.diagonal().segment<3>(at::p).array() = position * position;
+    UpdateConfig patient;
+    patient.max_iterations = 10;
+    const Covariance gate = e.P;
+    LidarModel registration = model(), judge = model();
+    e = update(e, registration, patient).posterior;
+    out.info = judge(e.x, 0.25 * gate);
+    const RegistrationReport& report = judge.report();
+    out.share = report.matched < fewest_rows_found ? 0 : static_cast<double>(report.matched) / (report.matched + report.rejected);
   }
-};
+  out.x = e.x;
+  return out;
+}
 
 }  // namespace
 
@@ -155,9 +146,9 @@ std::optional<FoundPose> find_pose(const VoxelMap& map, std::span<const PointClu
     grid.poses.resize(small_grid);
   }
   score(grid.poses, map, clusters, probe_count);
-  const GridRegistration registration{map, clusters, p_IL, config, workers};
+  const auto model = [&] { return LidarModel(map, clusters, p_IL, PoseCovariance::Zero(), config, workers); };
   std::vector<FoundPose> found;
-  for (const Candidate& c : best_of(std::move(grid.poses))) found.push_back(registration.from(expected, c.T_WI));
+  for (const Candidate& c : best_of(std::move(grid.poses))) found.push_back(registered_from(expected, c.T_WI, model));
   // Nearly every point of a sweep that is in its place meets a surface: what met none counts against a pose as well.
   const auto worth = [&clusters](const FoundPose& f) {
     return f.share * std::sqrt(static_cast<double>(f.info.rows) / static_cast<double>(std::max<std::size_t>(1, clusters.size())));

@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "kilvo/filter/innovation.hpp"
+
 namespace kilvo {
 
 void TimeOffset::add(const Eigen::Vector3d& turned, const Eigen::Vector3d& rate) {
@@ -30,14 +32,13 @@ std::optional<double> TimeOffset::beyond(double least, double sigmas) const {
 
 std::optional<double> TimeOffset::offset(double least) const {
   constexpr double enough = 20, sure = 8;  // sweeps, standard deviations
-  constexpr double usual_loss = 1.5;       // of 1.2 to 3: the state follows the sweeps, and a sweep is not an instant
   const auto seen = sweeps_ < enough ? std::nullopt : beyond(least, sure);
   return seen ? std::optional(usual_loss * *seen) : std::nullopt;
 }
 
 bool TimeOffset::is_doubtful() const {
-  constexpr double few = 5, least = 5e-4, sigmas = 3;  // sweeps, s, -
-  return sweeps_ > few && beyond(least, sigmas);
+  constexpr double few = 5, sigmas = 3;  // sweeps, -
+  return sweeps_ > few && beyond(least_clock_offset, sigmas);
 }
 
 }  // namespace kilvo

@@ -52,9 +52,9 @@ double Plane::variance_at(const Eigen::Vector3d& x) const {
   return static_cast<double>(offset_variance + tilt_variance_1 * a * a + tilt_variance_2 * b * b);
 }
 
-std::optional<Plane> fit_plane(const Moments& moments, const Eigen::Vector3d& origin, const PlaneConfig& config) {
+std::optional<Plane> fit_plane(const Moments& moments, const Eigen::Vector3d& origin, double min_points, double max_roughness) {
   const double n = moments.count();
-  if (n < config.min_points) return std::nullopt;
+  if (n < min_points) return std::nullopt;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eig;
   eig.computeDirect(moments.covariance());
   const Eigen::Vector3d lambda = eig.eigenvalues().cwiseMax(0.0);
@@ -63,7 +63,7 @@ std::optional<Plane> fit_plane(const Moments& moments, const Eigen::Vector3d& or
 
   const double sensor = normal.dot(moments.noise() * normal);
   // The thickness of n points has a relative standard deviation of sqrt(2/n).
-  const double explained = sensor * (1.0 + 3.0 * std::sqrt(2.0 / n)) + config.max_roughness * config.max_roughness;
+  const double explained = sensor * (1.0 + 3.0 * std::sqrt(2.0 / n)) + max_roughness * max_roughness;
   constexpr double extent_over_thickness = 4.0;
   if (!(lambda[0] < explained) || !(lambda[1] > extent_over_thickness * std::max(lambda[0], sensor))) return std::nullopt;
 

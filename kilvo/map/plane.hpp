@@ -48,13 +48,8 @@ struct Plane {
   double variance_at(const Eigen::Vector3d& x) const;
 };
 
-struct PlaneConfig {
-  double min_points = 8;        // fewer never make a plane
-  double max_roughness = 0.01;  // m; standard deviation beyond the measurement noise above which a surface is no plane
-};
-
-/// The plane through points with these moments around `origin`, if they lie on one: their thickness is what measurement noise and
-/// max_roughness explain, and their extent in both other directions is well above it.
-std::optional<Plane> fit_plane(const Moments& moments, const Eigen::Vector3d& origin, const PlaneConfig& config);
+/// The plane through points with these moments around `origin`, if they are enough and lie on one: their thickness is what measurement
+/// noise and `max_roughness` (m) explain, and their extent in both other directions is well above it.
+std::optional<Plane> fit_plane(const Moments& moments, const Eigen::Vector3d& origin, double min_points, double max_roughness);
 
 }  // namespace kilvo

@@ -17,6 +17,23 @@ constexpr std::uint32_t few = 6, long_ago = 50;
 // A plane that beams of so many sweeps passed through since points were found on it is gone.
 constexpr std::uint8_t gone = 5;
 
+// How far along the beam it is from x until it leaves the cube of this size that x is in.
+double way_out(const Eigen::Vector3d& x, const Eigen::Vector3d& direction, double size) {
+  double way = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const double low = size * std::floor(x[i] / size);
+    if (direction[i] > 0) way = std::min(way, (low + size - x[i]) / direction[i]);
+    if (direction[i] < 0) way = std::min(way, (low - x[i]) / direction[i]);
+  }
+  return way;
+}
+
+// The beam begins clearly on one side and ends clearly on the other.
+bool passes(const Plane& plane, const Eigen::Vector3d& from, const Eigen::Vector3d& to, double clear) {
+  const double before = plane.distance(from), behind = plane.distance(to);
+  return before * behind < 0 && std::min(std::abs(before), std::abs(behind)) > clear;
+}
+
 }  // namespace
 
 void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const PointGroup> groups) {
@@ -39,27 +56,6 @@ void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const Poin
     ++more;
   }
 }
-
-namespace {
-
-// How far along the beam it is from x until it leaves the cube of this size that x is in.
-double way_out(const Eigen::Vector3d& x, const Eigen::Vector3d& direction, double size) {
-  double way = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < 3; ++i) {
-    const double low = size * std::floor(x[i] / size);
-    if (direction[i] > 0) way = std::min(way, (low + size - x[i]) / direction[i]);
-    if (direction[i] < 0) way = std::min(way, (low - x[i]) / direction[i]);
-  }
-  return way;
-}
-
-// The beam begins clearly on one side and ends clearly on the other.
-bool passes(const Plane& plane, const Eigen::Vector3d& from, const Eigen::Vector3d& to, double clear) {
-  const double before = plane.distance(from), behind = plane.distance(to);
-  return before * behind < 0 && std::min(std::abs(before), std::abs(behind)) > clear;
-}
-
-}  // namespace
 
 std::size_t VoxelMap::direction_cell(const Eigen::Vector3d& way) {
   const Eigen::Vector3d d = (0.5 * direction_cells * (1 - 1e-9)) * (way.normalized().array() + 1);

@@ -10,11 +10,17 @@ namespace kilvo {
 
 using VoxelKey = std::uint64_t;
 
-/// Packs integer coordinates of 21 bits each (about +-1 million voxels).
+/// Of each coordinate in a key: about +-1 million voxels.
+inline constexpr int key_bits = 21;
+
+/// Packs integer coordinates.
 inline VoxelKey pack_key(std::int64_t x, std::int64_t y, std::int64_t z) {
-  constexpr std::uint64_t mask = (1ULL << 21) - 1;
-  return (static_cast<std::uint64_t>(x) & mask) | ((static_cast<std::uint64_t>(y) & mask) << 21) |
-         ((static_cast<std::uint64_t>(z) & mask) << 42);
+  const auto low = [](std::int64_t v) { return static_cast<std::uint64_t>(v) & ((1ULL << key_bits) - 1); };
+  return low(x) | low(y) << key_bits | low(z) << 2 * key_bits;
+}
+/// Its x, y or z (axis 0, 1, 2), with the sign.
+inline std::int64_t coordinate_of(VoxelKey key, int axis) {
+  return static_cast<std::int64_t>(key << (64 - (axis + 1) * key_bits)) >> (64 - key_bits);
 }
 
 /// floor() without a library call; |x| must be below 2^31.

@@ -14,31 +14,11 @@ constexpr double settled_sigmas = 4.0;
 constexpr std::size_t together = 32;
 
 Eigen::Vector3d centre_of(VoxelKey key, double size) {
-  const auto coordinate = [key](int shift) {
-    auto v = static_cast<std::int64_t>((key >> shift) & ((1ULL << 21) - 1));
-    if (v >= (1LL << 20)) v -= 1LL << 21;
-    return static_cast<double>(v) + 0.5;
-  };
-  return size * Eigen::Vector3d(coordinate(0), coordinate(21), coordinate(42));
+  const auto coordinate = [key](int axis) { return static_cast<double>(coordinate_of(key, axis)) + 0.5; };
+  return size * Eigen::Vector3d(coordinate(0), coordinate(1), coordinate(2));
 }
 
 }  // namespace
-
-template <class T>
-std::uint32_t VoxelMap::Pool<T>::take() {
-  if (!free.empty()) {
-    const std::uint32_t i = free.back();
-    free.pop_back();
-    return i;
-  }
-  if (used == blocks.size() * block_size) blocks.push_back(std::make_unique<T[]>(block_size));
-  return used++;
-}
-
-template <class T>
-void VoxelMap::Pool<T>::give_back(std::uint32_t i) {
-  free.push_back(i);
-}
 
 VoxelMap::VoxelMap(const MapConfig& config)
     : config_(config),
@@ -122,7 +102,7 @@ void VoxelMap::refit_if_due(Node& node, const Eigen::Vector3d& origin) {
   const double n = node.moments.count();
   if (n < config_.min_points || n < refit_growth * node.fitted_count) return;
   node.fitted_count = n;
-  const auto plane = fit_plane(node.moments, origin, {config_.min_points, config_.max_roughness});
+  const auto plane = fit_plane(node.moments, origin, config_.min_points, config_.max_roughness);
   node.is_plane = plane.has_value();
   if (plane) node.plane = *plane;
 }
@@ -197,19 +177,14 @@ void VoxelMap::free_children(Node& node) {
   for (const std::uint32_t child : children_[node.children]) {
     if (child != none) free_tree(child);
   }
-  children_.give_back(node.children);
+  children_.free.push_back(node.children);
   node.children = none;
 }
 
 void VoxelMap::free_tree(std::uint32_t index) {
   free_children(nodes_[index]);
-  nodes_.give_back(index);
+  nodes_.free.push_back(index);
   --node_count_;
-}
-
-void VoxelMap::erase_root(VoxelKey key) {
-  free_tree(roots_.find(key));
-  roots_.erase(key);
 }
 
 void VoxelMap::forget(const Eigen::Vector3d& centre) {
@@ -220,7 +195,8 @@ void VoxelMap::forget(const Eigen::Vector3d& centre) {
   const auto drop_beyond = [&](double radius) {
     std::erase_if(keys_, [&](VoxelKey key) {
       if (squared_distance(key) <= radius * radius) return false;
-      erase_root(key);
+      free_tree(roots_.find(key));
+      roots_.erase(key);
       return true;
     });
   };
@@ -234,8 +210,6 @@ void VoxelMap::forget(const Eigen::Vector3d& centre) {
     drop_beyond(std::sqrt(*cut));
   }
 }
-
-std::size_t VoxelMap::bytes_per_node() { return sizeof(Node) + sizeof(Children); }
 
 std::size_t VoxelMap::memory_bytes() const {
   return nodes_.blocks.size() * block_size * sizeof(Node) + children_.blocks.size() * block_size * sizeof(Children) +

@@ -79,7 +79,6 @@ class VoxelMap {
   /// Above every node id that a Match can have now.
   std::size_t node_capacity() const { return nodes_.used; }
   std::size_t memory_bytes() const;
-  static std::size_t bytes_per_node();
 
  private:
   static constexpr std::uint32_t none = VoxelIndex::none;
@@ -107,8 +106,13 @@ class VoxelMap {
     std::uint32_t used = 0;
     T& operator[](std::uint32_t i) { return blocks[i / block_size][i % block_size]; }
     const T& operator[](std::uint32_t i) const { return blocks[i / block_size][i % block_size]; }
-    std::uint32_t take();
-    void give_back(std::uint32_t i);
+    std::uint32_t take() {
+      if (free.empty() && used == blocks.size() * block_size) blocks.push_back(std::make_unique<T[]>(block_size));
+      if (free.empty()) return used++;
+      const std::uint32_t i = free.back();
+      free.pop_back();
+      return i;
+    }
   };
 
   // The leaf cell of a point, in integer coordinates: its upper bits are the root voxel, the lower ones the way down.
@@ -136,7 +140,6 @@ class VoxelMap {
   static std::size_t direction_cell(const Eigen::Vector3d& way);
   void forget_plane(const Path& path, int level, const Eigen::Vector3d& origin);
   void free_children(Node& node);
-  void erase_root(VoxelKey key);
   void free_tree(std::uint32_t node);
 
   MapConfig config_;

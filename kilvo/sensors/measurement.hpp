@@ -51,6 +51,7 @@ using Measurement = std::variant<ImuSample, JointSample, LidarScan, CameraImage>
 
 enum class Sensor : std::uint8_t { imu, legs, lidar, camera };
 inline constexpr int sensor_count = 4;
+constexpr std::size_t index_of(Sensor s) { return static_cast<std::size_t>(s); }
 
 /// The name used on the command line and in files: "imu", "legs", "lidar", "camera".
 constexpr const char* name_of(Sensor s) {

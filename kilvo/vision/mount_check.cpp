@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "kilvo/filter/innovation.hpp"
 #include "kilvo/math/decompositions.hpp"
 
 namespace kilvo {
@@ -17,7 +18,6 @@ constexpr double best_view = 2e-4;                           // rad; no view say
 constexpr double alike = 0.01;                               // rad; views that are turned by less say nothing,
 constexpr double alike_rate = 0.05;                          // rad/s; unless the robot turned at another rate
 constexpr double repeated = 20;                              // views of the same seconds repeat each other
-constexpr double usual_loss = 1.5;                           // of 1.2 to 7
 constexpr double likely_mount = 0.02, likely_offset = 0.02;  // rad, s
 
 }  // namespace

@@ -11,8 +11,6 @@
 namespace kilvo {
 namespace {
 
-// Beyond this many standard deviations the pull of a patch stays the same (Huber).
-constexpr double robust_sigmas = 1.5;
 // Pixels a patch needs around it at its level.
 constexpr double patch_border = 5;
 // An expected error of so many pixels is within reach of the finest level; twice that of the next.

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "kilvo/filter/plausible.hpp"
 #include "kilvo/filter/pose_error.hpp"
 #include "kilvo/filter/update.hpp"
 #include "kilvo/vision/depth_view.hpp"
@@ -17,12 +16,12 @@ namespace {
 
 // A view that differs so much from those that a point has is kept as well: octaves of scale, rad.
 constexpr double new_scale = 0.4, new_angle = 0.25;
-// So many patches hold a pose by themselves.
-constexpr int enough = 20;
+// So many patches hold a pose by themselves; of those that should be seen, one in so many is found.
+constexpr int enough = 20, one_in = 5;
 
 // Fewer patches, or a smaller share of those that should be seen, do not carry an estimate.
 bool carries_estimate(const PhotometricModel::Report& report) {
-  constexpr int fewest = 10, one_in = 5;
+  constexpr int fewest = 10;
   return report.used >= fewest && one_in * report.used >= report.tracks - report.saturated;
 }
 
@@ -182,7 +181,7 @@ bool VisualPipeline::is_lost_among_patches(const ImageContext& context) const {
 // An image that hardly any of many patches is found in is dark, covered, torn, or of another world: nothing is learnt from it, unless
 // that goes on, for then the world has changed.
 bool VisualPipeline::says_nothing(const Work& work) {
-  constexpr int one_in = 5, patient = 20;  // images
+  constexpr int patient = 20;  // images
   const PhotometricModel::Report& report = work.model.report();
   const bool nothing = report.tracks >= enough && (report.used == 0 || one_in * report.used < report.tracks - report.saturated);
   in_vain_ = nothing ? in_vain_ + 1 : 0;
@@ -285,8 +284,7 @@ void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const S
 }
 
 std::optional<double> VisualPipeline::clock_offset() {
-  constexpr double least = 5e-4;  // s
-  const auto offset = mount_check_.time_offset(least);
+  const auto offset = mount_check_.time_offset(least_clock_offset);
   if (!offset) return std::nullopt;
   restart_mount_check();
   forget_map();

@@ -4,7 +4,7 @@ import unittest
 
 from planted_tree import PlantedTree
 
-LIMIT = 510
+LIMIT = 494
 
 
 class CheckConstants(PlantedTree):
