@@ -149,7 +149,7 @@ LegModel::Used Replay::apply(Estimate& e, const LegStep& step, Gain<LegModel::ma
     const Stance& foot = step.foot[side];
     if (foot.ends) end_stance(e, side);
     if (foot.begins) begin_stance(e, side, foot.point, config_.legs);
-    if (foot.used && !foot.begins) move_stance(e, side, foot.shift);
+    if (foot.used && !foot.begins) move_stance(e, side, foot);
     any = any || foot.used;
   }
   if (step.gyro_bias) e = with_gyro_bias(e, *step.gyro_bias);

@@ -137,12 +137,13 @@ void begin_stance(Estimate& e, std::size_t side, const SolePoint& point, const L
   e.P.block<3, 3>(pc, pc).diagonal().array() += config.position_sigma * config.position_sigma;
 }
 
-void move_stance(Estimate& e, std::size_t side, const Eigen::Vector3d& shift) {
+void move_stance(Estimate& e, std::size_t side, const Stance& foot) {
   const int pc = at::pcl + 3 * static_cast<int>(side);
-  const Eigen::Matrix3d J = -e.x.R.matrix() * skew(shift);
-  e.x.pc[side] += e.x.R * shift;
+  const Eigen::Matrix3d J = -e.x.R.matrix() * skew(foot.shift);
+  e.x.pc[side] += e.x.R * foot.shift;
   e.P.middleRows<3>(pc) += (J * e.P.middleRows<3>(at::R)).eval();
   e.P.middleCols<3>(pc) += (e.P.middleCols<3>(at::R) * J.transpose()).eval();
+  e.P.block<2, 2>(pc, pc).diagonal().array() += foot.settled2;
 }
 
 void place_stances(State& x, const LegStep& step) {

@@ -23,6 +23,7 @@ struct Stance {
   bool used = false;                                     // it stands: rows are made of it
   SolePoint point;                                       // on which it stands; IMU frame
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();       // from where the point was in the sole before to where it is now; IMU frame, m
+  double settled2 = 0;                                   // variance of its slide along the ground since the sample before, m^2
   double variance_scale = 1;                             // factor on the variance of its rows (Eq. 8)
   std::optional<Eigen::Matrix<double, 7, 1>> row_scale;  // another one on that of each: velocity, position, height
   SO3 R_IF;
@@ -95,8 +96,8 @@ class LegModel {
 
 /// Puts the contact position of a foot into the state: mean, covariance and cross-covariance from the pose and the kinematics.
 void begin_stance(Estimate& e, std::size_t side, const SolePoint& point, const LegConfig& config);
-/// Moves it along the sole, by `shift` in the IMU frame: mean and covariance.
-void move_stance(Estimate& e, std::size_t side, const Eigen::Vector3d& shift);
+/// Moves it along the sole, by the foot's shift: mean and covariance; and adds what the foot may have slid on the ground.
+void move_stance(Estimate& e, std::size_t side, const Stance& foot);
 /// Both of these on the mean alone.
 void place_stances(State& x, const LegStep& step);
 /// Takes it out: its rows and columns become zero.

@@ -277,6 +277,17 @@ TEST(LegMeasurements, AtTouchdownTheErrorOfTheContactPositionIsAsItsCovarianceSa
   EXPECT_LT(off.cwiseAbs().maxCoeff(), 0.05);
 }
 
+TEST(LegMeasurements, WhatAFootMayHaveSlidIsInTheVarianceOfItsContactPositionAlongTheGround) {
+  Estimate e;
+  e.P.setIdentity();
+  Stance foot;
+  foot.settled2 = 1e-4;
+  move_stance(e, 1, foot);
+  Covariance expected = Covariance::Identity();
+  expected.diagonal().segment<2>(at::pcr).array() += 1e-4;
+  EXPECT_TRUE(e.P.isApprox(expected, 1e-12));
+}
+
 TEST(LegMeasurements, AtLiftOffNothingOfTheFootIsLeftAndNothingElseChanges) {
   test::Random random(7);
   Estimate e{Time{}, test::random_state(random), random.covariance<at::size>(0.1)};

@@ -94,6 +94,27 @@ TEST(StanceTracker, WhenNoFootIsBelievedTheMoreProbableCarriesUnlessTheBodyFalls
   EXPECT_FALSE(flying.foot[0].used || flying.foot[1].used);
 }
 
+TEST(StanceTracker, AFootThatStillSlidesAsItEntersTakesItsContactPositionAlongAndALaterOneDoesNot) {
+  constexpr double sliding = 0.2, period = 1e-3;  // m/s, s
+  const LegConfig config;
+  StanceTracker tracker{config};
+  const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
+  double entering = 0, later = 0;
+  for (int i = 0; i < 100; ++i) {
+    Feet feet;
+    feet.t = test::gait_begin + from_seconds(period * i);
+    feet.foot = {test::seen_from(body, {{sliding * period * i, 0.1, 0}, {sliding, 0, 0}}), test::seen_from(body, standing(1))};
+    Contacts contacts;
+    contacts.t = feet.t;
+    contacts.since = {test::gait_begin, test::gait_begin - std::chrono::seconds(1)};
+    const LegStep step = tracker.step(feet, contacts, body, Eigen::Vector3d::Zero());
+    (contacts.phase(0) < config.entry_delay + 0.02 ? entering : later) += step.foot[0].settled2;
+    EXPECT_EQ(step.foot[1].settled2, 0);
+  }
+  EXPECT_NEAR(std::sqrt(entering), sliding * 0.02, 0.1 * sliding * 0.02) << "as far as it slides at this speed while it enters";
+  EXPECT_EQ(later, 0) << "or a wrong velocity of the state would take it along";
+}
+
 TEST(StanceTracker, OfTwoFeetThatStandTheLighterOneCountsByItsLoadAndOneAloneInFull) {
   const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
   const auto scales = [&body](double left, bool right_stands) {
