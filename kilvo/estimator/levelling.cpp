@@ -41,7 +41,7 @@ void Levelling::apply(const SO3& R_LW, Output& o) {
   o.R_LW = R_LW * o.R_LW.value_or(SO3());
   for (Eigen::Vector3d* v : {&o.x.p, &o.x.v, &o.x.g, &o.x.pc[0], &o.x.pc[1]}) *v = R * *v;
   for (const int block : {at::v, at::p, at::g, at::pcl, at::pcr}) {
-    if (o.P.diagonal().segment<3>(block).isZero(0)) continue;  // nothing is said of it
+    if (o.P.diagonal().segment<3>(block).isZero(0)) continue;  // not in use
     o.P.middleRows<3>(block) = (R * o.P.middleRows<3>(block)).eval();
     o.P.middleCols<3>(block) = (o.P.middleCols<3>(block) * R.transpose()).eval();
   }
