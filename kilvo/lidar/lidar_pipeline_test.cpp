@@ -201,11 +201,11 @@ TEST(LidarPipeline, TheErrorOfTheMapIsNoContradiction) {
   }
 }
 
-TEST(LidarPipeline, AfterFourPeriodsOfSilenceTheMapIsJoinedAgain) {
+TEST(LidarPipeline, AfterThreePeriodsOfSilenceTheMapIsJoinedAgain) {
   LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, ProcessNoise{}, 1);
-  pipeline.note_silence(milliseconds(400));
+  pipeline.note_silence(milliseconds(300));
   EXPECT_FALSE(pipeline.is_rejoining());
-  pipeline.note_silence(milliseconds(401));
+  pipeline.note_silence(milliseconds(301));
   EXPECT_TRUE(pipeline.is_rejoining());
 }
 
