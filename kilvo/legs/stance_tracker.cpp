@@ -201,12 +201,11 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     if (phase > config_.entry_delay + entry_time)
       noise_.add(side, velocity, -x.g.normalized(), out.dt,
                  on_legs_alone_ ? std::optional(std::hypot(sigma_v, described_share * x.v.norm())) : std::nullopt);
-    const double usual2 = contacts.sole_speed * contacts.sole_speed / 3;
-    const double noise2 = std::max(config_.velocity_sigma * config_.velocity_sigma, usual2) + sigma_v * sigma_v;
+    const double noise2 = out.velocity_sigma * out.velocity_sigma + sigma_v * sigma_v;
     const double entering = std::clamp(1.0 - (phase - config_.entry_delay) / entry_time, 0.0, 1.0);
     // What still slides as it comes down takes its contact position along. Later only an error of the state would seem to slide for long.
     if (entering > 0) foot.settled2 = moving2 * entry_time * out.dt;
-    // As much as the noise across on all three axes, and as supporting soles usually seem to move, is no motion.
+    // As much as the noise across on all three axes is no motion.
     const bool by_foot = adapts_ && !by_row_;
     const double loose = 1.0 + (by_foot ? std::max(0.0, moving2 / noise2 - 3.0) : 0.0) + (loosest - 1) * entering;
     if (by_row_ && !foot.begins)

@@ -115,6 +115,25 @@ TEST(StanceTracker, AFootThatStillSlidesAsItEntersTakesItsContactPositionAlongAn
   EXPECT_EQ(later, 0) << "or a wrong velocity of the state would take it along";
 }
 
+// What contacts learn of supporting soles is of their lowest points, from touchdown to lift-off.
+TEST(StanceTracker, AFootThatMovesMoreThanStandingSolesDidCountsLessWhateverContactsLearntOfSoles) {
+  StanceTracker tracker{LegConfig{}};
+  const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
+  Feet feet;
+  feet.t = test::gait_begin;
+  Contacts contacts;
+  contacts.sole_speed = 0.3;
+  const auto scale = [&](double speed) {
+    feet.t += std::chrono::milliseconds(10);
+    feet.foot = {test::seen_from(body, {{0, 0.1, 0}, {speed, 0, 0}}), test::seen_from(body, standing(1))};
+    contacts.t = feet.t;
+    return tracker.step(feet, contacts, body, Eigen::Vector3d::Zero()).foot[0].variance_scale;
+  };
+  for (int i = 0; i < 2000; ++i) scale(0);
+  EXPECT_EQ(scale(0), 1);
+  EXPECT_GT(scale(0.2), 10);
+}
+
 TEST(StanceTracker, OfTwoFeetThatStandTheLighterOneCountsByItsLoadAndOneAloneInFull) {
   const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
   const auto scales = [&body](double left, bool right_stands) {
