@@ -57,7 +57,7 @@ bool is_refuted(const Finding& finding, const Diagnosis& longer) {
   if (std::ranges::any_of(longer.findings, is_same)) return false;
   // The LiDAR is judged against the IMU, whether the legs can be or not.
   const auto is_open = [](const Check& c) { return c.sensor == Sensor::lidar && c.verdict == Check::Verdict::unknown; };
-  const bool lidar_is_good = !longer.seems_wrong[static_cast<std::size_t>(Sensor::lidar)] && std::ranges::none_of(longer.checks, is_open);
+  const bool lidar_is_good = !longer.seems_wrong[index_of(Sensor::lidar)] && std::ranges::none_of(longer.checks, is_open);
   return longer.settled || (finding.sensor == Sensor::lidar && lidar_is_good);
 }
 

@@ -121,7 +121,7 @@ class Examination {
   void check(Sensor sensor, const std::string& what, Check::Verdict verdict, const std::string& detail);
   void find(Finding finding);
   /// Something of this sensor is off, and more data would make it sure.
-  bool& seems_wrong(Sensor sensor) { return diagnosis_.seems_wrong[static_cast<std::size_t>(sensor)]; }
+  bool& seems_wrong(Sensor sensor) { return diagnosis_.seems_wrong[index_of(sensor)]; }
   void find_offset(Sensor sensor, double offset, double sigma, const std::string& evidence);
   void refine_rotation(Sensor sensor, const std::string& what, const SO3& described, const SO3& measured, const Eigen::Vector3d& sigma,
                        double method, const std::string& key);

@@ -228,7 +228,7 @@ TEST(DescriptionWatch, ALiDARIsClearedByMoreDataThoughTheLegsStayUnknown) {
   finding.sensor = Sensor::imu;
   EXPECT_FALSE(is_refuted(finding, longer));
   finding.sensor = Sensor::lidar;
-  longer.seems_wrong[static_cast<std::size_t>(Sensor::lidar)] = true;
+  longer.seems_wrong[index_of(Sensor::lidar)] = true;
   EXPECT_FALSE(is_refuted(finding, longer));
   longer.seems_wrong = {};
   longer.findings = {finding};

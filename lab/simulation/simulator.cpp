@@ -18,8 +18,6 @@ SimulatorConfig worn(SimulatorConfig config) {
 
 enum SimulatorStream : std::uint8_t { bias_stream = 1, offset_stream = 2, sensor_stream = 10 };
 
-constexpr std::size_t index_of(Sensor sensor) { return static_cast<std::size_t>(sensor); }
-
 Ground ground_of(const Scenario& scenario, std::uint64_t seed) { return make_scene(scenario.world, seed).ground; }
 
 }  // namespace
