@@ -63,7 +63,7 @@ void LegMotionError::add(const State& x, const Eigen::Vector3d& velocity_I, doub
     if (c.time > longest) comparison_.reset();
     if (measured_ && c.time > window) learn(up_W);
   }
-  if (measured_ && !comparison_) comparison_.emplace();
+  if (measured_ && !comparison_) comparison_ = Comparison{};
   measured_ = false;
 }
 
