@@ -16,7 +16,7 @@ constexpr double well_known_position = 0.08, well_known_rotation = 0.03;
 // The grid: what a registration starting from its points can reach.
 constexpr double step = 0.25, yaw_step = 0.09;                         // m, rad
 constexpr int most_steps = 8, most_steps_up = 2, most_steps_yaw = 35;  // all round
-// Clusters that are looked up for each pose of a small grid, and then for the best of a large one.
+// Clusters that are looked up for each pose of a small grid; of a larger one few for each, to choose the best of that number.
 constexpr std::size_t probe_count = 160, few_probes = 32, small_grid = 4000;
 constexpr std::size_t finalists = 12;
 constexpr double near_surface = 0.08, per_metre = 0.02;  // m
