@@ -8,7 +8,7 @@
 namespace kilvo {
 namespace {
 
-Time at_seconds(double s) { return Time(from_seconds(s)); }
+Time time_at(double s) { return Time(from_seconds(s)); }
 
 // At 200 Hz, of a robot that stands or sways.
 std::vector<ImuSample> stream(bool moving, int count) {
@@ -53,7 +53,7 @@ TEST(StationarityDetector, TakesAnImpactForUnusualAndForgetsIt) {
   StationarityDetector detector(0.03, 0.4, 10);
   ImuSample s;
   const auto add = [&](int i, double z) {
-    s.t = at_seconds(0.005 * i);
+    s.t = time_at(0.005 * i);
     s.accel = {0.1 * std::sin(0.9 * i), 0.1 * std::cos(1.3 * i), z + 0.2 * std::sin(0.5 * i)};
     detector.add(s, Eigen::Vector3d::Zero());
   };

@@ -13,7 +13,7 @@ Time at(Duration since) { return Time(std::chrono::hours(1000)) + since; }
 
 /// An IMU of 200 Hz and legs of 1 kHz that come 3 ms late, with a camera of 10 Hz that comes 40 ms late. Stamps are of a clock that shows
 /// `shift` more.
-struct Robot {
+struct StampedRobot {
   ClockSteps clocks;
   Duration now = milliseconds(0);
   int refused = 0;
@@ -50,7 +50,7 @@ struct Robot {
 };
 
 TEST(ClockSteps, LeaveStampsAloneThatOnlyGoOn) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(2), {}, {});
   EXPECT_EQ(r.clocks.count(), 0u);
   EXPECT_EQ(r.refused, 0);
@@ -60,7 +60,7 @@ TEST(ClockSteps, LeaveStampsAloneThatOnlyGoOn) {
 TEST(ClockSteps, PutAllThatGoBackTogetherWhereTheyWereMeasured) {
   for (const Duration step : {Duration(-milliseconds(30)), Duration(-milliseconds(150)), Duration(-seconds(1))}) {
     SCOPED_TRACE(std::chrono::duration<double>(step).count());
-    Robot r;
+    StampedRobot r;
     r.walk(seconds(2), {}, {});
     r.walk(milliseconds(60), step, step);  // until it is sure
     EXPECT_EQ(r.clocks.count(), 1u);
@@ -75,7 +75,7 @@ TEST(ClockSteps, PutAllThatGoBackTogetherWhereTheyWereMeasured) {
 }
 
 TEST(ClockSteps, LeaveASensorAloneWhoseClockDidNotStep) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(2), {}, {});
   r.walk(seconds(2), -seconds(1), {});
   EXPECT_EQ(r.clocks.count(), 1u);
@@ -84,7 +84,7 @@ TEST(ClockSteps, LeaveASensorAloneWhoseClockDidNotStep) {
 }
 
 TEST(ClockSteps, LeaveItAloneHoweverLateItIsAfterwards) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(2), {}, {});
   r.walk(seconds(3), -seconds(1), {});
   CameraImage late;
@@ -95,7 +95,7 @@ TEST(ClockSteps, LeaveItAloneHoweverLateItIsAfterwards) {
 }
 
 TEST(ClockSteps, StampsThatAreNoTimesAreRefused) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(2), {}, {});
   for (const std::int64_t ns : {std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
     Measurement absurd = ImuSample{.t = time_from_ns(ns)};
@@ -106,7 +106,7 @@ TEST(ClockSteps, StampsThatAreNoTimesAreRefused) {
 }
 
 TEST(ClockSteps, TakeASecondStepLikeTheFirst) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(2), {}, {});
   r.walk(seconds(2), -seconds(1), -seconds(1));
   r.walk(milliseconds(60), -seconds(3), -seconds(3));
@@ -119,7 +119,7 @@ TEST(ClockSteps, TakeASecondStepLikeTheFirst) {
 }
 
 TEST(ClockSteps, AreNotSeenInSingleSamplesThatAreAheadOrLate) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(2), {}, {});
   for (const Duration off : {Duration(std::chrono::hours(1)), Duration(-seconds(1)), Duration(seconds(5)), Duration(milliseconds(150)),
                              Duration(milliseconds(500)), Duration(-milliseconds(300))}) {
@@ -135,7 +135,7 @@ TEST(ClockSteps, AreNotSeenInSingleSamplesThatAreAheadOrLate) {
 TEST(ClockSteps, OfTheImuAloneAreFollowedEitherWay) {
   for (const Duration step : {milliseconds(30), milliseconds(-30), milliseconds(120), milliseconds(-300), milliseconds(5000)}) {
     SCOPED_TRACE(std::chrono::duration<double>(step).count());
-    Robot r;
+    StampedRobot r;
     r.walk(seconds(2), {}, {});
     const auto others_stay = [&r, step](Duration how_long) {
       for (const Duration end = r.now + how_long; r.now < end; r.now += milliseconds(1)) {
@@ -158,7 +158,7 @@ TEST(ClockSteps, OfTheImuAloneAreFollowedEitherWay) {
 
 TEST(ClockSteps, AreNotSeenInGaps) {
   for (const bool legs_too : {false, true}) {
-    Robot r;
+    StampedRobot r;
     r.walk(seconds(2), {}, {});
     for (const Duration gap : {milliseconds(20), milliseconds(60), milliseconds(400)}) {
       for (const Duration end = r.now + gap; r.now < end; r.now += milliseconds(1)) {
@@ -175,7 +175,7 @@ TEST(ClockSteps, AreNotSeenInGaps) {
 }
 
 TEST(ClockSteps, AreNotSeenWhereLegsHaveGone) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(2), {}, {});
   for (Duration ms{}; ms < seconds(3); ms += milliseconds(5)) {
     r.now += milliseconds(ms == seconds(1) ? 60 : 5);
@@ -186,7 +186,7 @@ TEST(ClockSteps, AreNotSeenWhereLegsHaveGone) {
 }
 
 TEST(ClockSteps, FollowAClockThatGoesAhead) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(2), {}, {});
   const Duration ahead = seconds(10);
   r.now += ahead;
@@ -200,7 +200,7 @@ TEST(ClockSteps, OneStampOfTheImuAheadOfAllOthersCostsOneSample) {
   for (const int ms : {12, 20, 40, 80, 150, 250, 500, 950}) {
     for (const bool legs : {true, false}) {
       SCOPED_TRACE(testing::Message() << ms << " ms, legs " << legs);
-      Robot r;
+      StampedRobot r;
       r.walk(seconds(2), {}, {}, legs);
       Measurement wrong = ImuSample{.t = at(r.now + milliseconds(ms))};
       EXPECT_TRUE(r.clocks.follow(wrong).has_value());
@@ -216,7 +216,7 @@ TEST(ClockSteps, OneStampOfTheImuAheadOfAllOthersCostsOneSample) {
 TEST(ClockSteps, GapsAndJitterOfAnImuAloneCostNothing) {
   for (const int gap : {0, 20, 60, 100, 200, 400}) {
     SCOPED_TRACE(gap);
-    Robot r;
+    StampedRobot r;
     for (int i = 0; i < 400; ++i) {
       r.now += milliseconds(i == 200 ? gap : 5);
       const Duration jitter = milliseconds(i * 7 % 5 - 2);
@@ -228,7 +228,7 @@ TEST(ClockSteps, GapsAndJitterOfAnImuAloneCostNothing) {
 }
 
 TEST(ClockSteps, AGapOfTheImuWhileOthersGoOnCostsNothing) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(2), {}, {});
   for (const Duration end = r.now + milliseconds(400); r.now < end; r.now += milliseconds(1)) {
     JointSample joints;
@@ -241,7 +241,7 @@ TEST(ClockSteps, AGapOfTheImuWhileOthersGoOnCostsNothing) {
 
 // What was missing comes 0.3 s late, while what should come now is late as well: a time that had gone back would repeat what was there.
 TEST(ClockSteps, WhatFillsAGapIsLateAndNoStep) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(2), {}, {});
   const Duration gap = r.now;
   const auto walk_without_imu = [&](Duration how_long, std::optional<Duration> late) {
@@ -264,7 +264,7 @@ TEST(ClockSteps, WhatFillsAGapIsLateAndNoStep) {
 }
 
 TEST(ClockSteps, ARecordingThatIsPlayedAgainIsARestartWithItsOwnStamps) {
-  Robot r;
+  StampedRobot r;
   r.walk(seconds(60), {}, {});
   EXPECT_EQ(r.clocks.restarts(), 0u);
   r.walk(seconds(1), -seconds(60), -seconds(60));

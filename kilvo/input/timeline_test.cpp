@@ -6,9 +6,9 @@
 namespace kilvo {
 namespace {
 
-constexpr std::array<bool, sensor_count> imu_and_lidar = {true, false, true, false};
+constexpr std::array<bool, sensor_count> with_lidar = {true, false, true, false};
 
-ImuSample imu_at(double s) {
+ImuSample imu_sample(double s) {
   ImuSample m;
   m.t = time_from_ns(0) + from_seconds(s);
   return m;
@@ -37,9 +37,9 @@ TEST(Timeline, AScanIsCompleteAtItsLastPointWhateverTheirOrder) {
 }
 
 TEST(Timeline, ReleasesInOrderOfCompletionOnceBothSensorsAreBeyond) {
-  Timeline timeline(imu_and_lidar, from_seconds(10));
-  EXPECT_FALSE(timeline.push(imu_at(1.000)));
-  EXPECT_FALSE(timeline.push(imu_at(1.095)));
+  Timeline timeline(with_lidar, from_seconds(10));
+  EXPECT_FALSE(timeline.push(imu_sample(1.000)));
+  EXPECT_FALSE(timeline.push(imu_sample(1.095)));
   EXPECT_TRUE(all_from(timeline).empty()) << "the LiDAR has not been heard";
   EXPECT_FALSE(timeline.push(scan_from(0.99, 0.1)));
   EXPECT_EQ(all_from(timeline), (std::vector<double>{1.0, 1.09})) << "nothing is known of the LiDAR beyond 1.09";
@@ -48,9 +48,9 @@ TEST(Timeline, ReleasesInOrderOfCompletionOnceBothSensorsAreBeyond) {
 }
 
 TEST(Timeline, NothingWaitsForAScanThatCannotBeCompleteYet) {
-  Timeline timeline(imu_and_lidar, from_seconds(10));
+  Timeline timeline(with_lidar, from_seconds(10));
   for (const double begin : {0.8, 0.9}) EXPECT_FALSE(timeline.push(scan_from(begin, 0.1)));
-  for (const double s : {0.95, 1.0, 1.06, 1.08}) EXPECT_FALSE(timeline.push(imu_at(s)));
+  for (const double s : {0.95, 1.0, 1.06, 1.08}) EXPECT_FALSE(timeline.push(imu_sample(s)));
   EXPECT_EQ(all_from(timeline), (std::vector<double>{0.9, 0.95, 1.0, 1.0, 1.06})) << "the next scan may be complete from 1.07 on";
 }
 
@@ -63,7 +63,7 @@ TEST(Timeline, NothingWaitsForImagesThatNeedNotBeWaitedFor) {
       EXPECT_FALSE(timeline.push(image));
     }
     EXPECT_FALSE(timeline.push(scan_from(1.0, 0.1)));
-    EXPECT_FALSE(timeline.push(imu_at(1.11)));
+    EXPECT_FALSE(timeline.push(imu_sample(1.11)));
     EXPECT_EQ(all_from(timeline), wait ? (std::vector<double>{0.84, 0.94}) : (std::vector<double>{0.84, 0.94, 1.1}));
   }
 }
@@ -72,58 +72,58 @@ TEST(Timeline, ALateScanOrImageGoesNext) {
   CameraImage image;
   image.t = time_from_ns(0) + from_seconds(0.9);
   Timeline timeline({true, false, false, true}, from_seconds(0.2), false);
-  for (const double s : {0.8, 1.0}) EXPECT_FALSE(timeline.push(imu_at(s)));
+  for (const double s : {0.8, 1.0}) EXPECT_FALSE(timeline.push(imu_sample(s)));
   EXPECT_EQ(all_from(timeline).size(), 2u);
   EXPECT_FALSE(timeline.push(image));
   EXPECT_EQ(all_from(timeline), (std::vector<double>{0.9}));
-  EXPECT_EQ(timeline.push(imu_at(0.99)), Reason::late);
+  EXPECT_EQ(timeline.push(imu_sample(0.99)), Reason::late);
   image.t -= from_seconds(0.2);
   EXPECT_EQ(timeline.push(image), Reason::late);
 }
 
 TEST(Timeline, WaitsForASilentSensorNoLongerThanMaxWait) {
-  Timeline timeline(imu_and_lidar, from_seconds(0.2));
-  for (int i = 0; i <= 30; ++i) EXPECT_FALSE(timeline.push(imu_at(1.0 + 0.01 * i)));
+  Timeline timeline(with_lidar, from_seconds(0.2));
+  for (int i = 0; i <= 30; ++i) EXPECT_FALSE(timeline.push(imu_sample(1.0 + 0.01 * i)));
   const auto released = all_from(timeline);
   ASSERT_EQ(released.size(), 11u);
   EXPECT_DOUBLE_EQ(released.back(), 1.1);
 }
 
 TEST(Timeline, DoesNotWaitForASensorThatHasBeenSilentForLong) {
-  Timeline timeline(imu_and_lidar, from_seconds(0.2));
+  Timeline timeline(with_lidar, from_seconds(0.2));
   for (int i = 0; i <= 5; ++i) EXPECT_FALSE(timeline.push(scan_from(1.0 + 0.1 * i, 0)));
   for (int i = 0; i <= 60; ++i) {
-    EXPECT_FALSE(timeline.push(imu_at(1.3 + 0.01 * i)));
+    EXPECT_FALSE(timeline.push(imu_sample(1.3 + 0.01 * i)));
     all_from(timeline);
   }
   // Silent for more than three periods: the newest sample goes at once.
-  EXPECT_FALSE(timeline.push(imu_at(1.91)));
+  EXPECT_FALSE(timeline.push(imu_sample(1.91)));
   ASSERT_TRUE(timeline.pop());
   EXPECT_FALSE(timeline.pop());
 }
 
 TEST(Timeline, SortsSwappedNeighbours) {
   Timeline timeline({true, false, false, false}, from_seconds(0.2));
-  timeline.push(imu_at(1.0));
-  Timeline waiting(imu_and_lidar, from_seconds(0.2));
-  for (const double s : {1.0, 1.02, 1.01, 1.03}) EXPECT_FALSE(waiting.push(imu_at(s)));
+  timeline.push(imu_sample(1.0));
+  Timeline waiting(with_lidar, from_seconds(0.2));
+  for (const double s : {1.0, 1.02, 1.01, 1.03}) EXPECT_FALSE(waiting.push(imu_sample(s)));
   waiting.end();
   EXPECT_EQ(all_from(waiting), (std::vector<double>{1.0, 1.01, 1.02, 1.03}));
 }
 
 TEST(Timeline, RefusesDuplicatesAndWhatIsOlderThanWhatIsOut) {
   Timeline timeline({true, false, false, false}, from_seconds(0.2));
-  EXPECT_FALSE(timeline.push(imu_at(1.0)));
-  EXPECT_EQ(timeline.push(imu_at(1.0)), Reason::duplicate);
+  EXPECT_FALSE(timeline.push(imu_sample(1.0)));
+  EXPECT_EQ(timeline.push(imu_sample(1.0)), Reason::duplicate);
   EXPECT_EQ(all_from(timeline).size(), 1u);
-  EXPECT_EQ(timeline.push(imu_at(0.5)), Reason::late);
+  EXPECT_EQ(timeline.push(imu_sample(0.5)), Reason::late);
 }
 
 TEST(Timeline, OneStampFarAheadIsDroppedAndHurtsNobody) {
   Timeline timeline({true, false, false, false}, from_seconds(0.2));
-  EXPECT_FALSE(timeline.push(imu_at(1.0)));
-  EXPECT_FALSE(timeline.push(imu_at(3601.0)));
-  EXPECT_FALSE(timeline.push(imu_at(1.005)));
+  EXPECT_FALSE(timeline.push(imu_sample(1.0)));
+  EXPECT_FALSE(timeline.push(imu_sample(3601.0)));
+  EXPECT_FALSE(timeline.push(imu_sample(1.005)));
   EXPECT_EQ(timeline.take_jumped(), std::vector<Sensor>{Sensor::imu});
   const auto released = all_from(timeline);
   ASSERT_EQ(released.size(), 2u);
@@ -132,8 +132,8 @@ TEST(Timeline, OneStampFarAheadIsDroppedAndHurtsNobody) {
 
 TEST(Timeline, ARecordingThatWasPausedGoesOnWithoutALoss) {
   Timeline timeline({true, false, false, false}, from_seconds(0.2));
-  EXPECT_FALSE(timeline.push(imu_at(1.0)));
-  for (int i = 0; i < 12; ++i) EXPECT_FALSE(timeline.push(imu_at(60.0 + 0.005 * i)));
+  EXPECT_FALSE(timeline.push(imu_sample(1.0)));
+  for (int i = 0; i < 12; ++i) EXPECT_FALSE(timeline.push(imu_sample(60.0 + 0.005 * i)));
   EXPECT_EQ(all_from(timeline).size(), 13u);
   EXPECT_TRUE(timeline.take_jumped().empty());
 }
@@ -154,7 +154,7 @@ double longest_wait(double from, double until, int& late, Legs&& legs) {
   for (int ms = 0; ms < 1000 * until; ++ms) {
     const double s = 1e-3 * ms;
     if (ms % 5 == 0) {
-      EXPECT_FALSE(timeline.push(imu_at(s)));
+      EXPECT_FALSE(timeline.push(imu_sample(s)));
     }
     if (const std::optional<double> stamp = legs(s)) late += timeline.push(legs_at(*stamp)) ? 1 : 0;
     while (auto m = timeline.pop()) {
@@ -182,7 +182,7 @@ TEST(Timeline, LegsThatComeLateOrAgainAreWaitedFor) {
 TEST(Timeline, WithoutTheImuNoSensorFillsTheMemory) {
   constexpr std::size_t megabyte = std::size_t{1} << 20;
   Timeline timeline({true, false, true, true}, from_seconds(0.2));
-  EXPECT_FALSE(timeline.push(imu_at(0)));
+  EXPECT_FALSE(timeline.push(imu_sample(0)));
   std::size_t waiting = 0, most = 0, scans = 0, given_up = 0;
   for (int i = 0; i < 400; ++i) {
     CameraImage image;

@@ -13,7 +13,7 @@ constexpr double mount = 0.01, length = 0.01, gyro_scale = 0.003;  // one standa
 
 struct Error {
   Eigen::Vector3d tilt_of_legs = Eigen::Vector3d::Zero();  // rad, in the IMU frame
-  double length = 0, gyro_scale = 0, gyro_drift = 0;  // rad/s^2
+  double length = 0, gyro_scale = 0, gyro_drift = 0;       // rad/s^2
 };
 
 /// A way of `steps` of 1 cm along x of the IMU, turning by `turn` each, at intervals of dt (s).
@@ -21,7 +21,7 @@ struct Way {
   State end;
   LegMotionError error;
 };
-Way walked(int steps, double turn, const Error& e, double dt = 0) {
+Way way_of(int steps, double turn, const Error& e, double dt = 0) {
   Way way;
   State& x = way.end;
   x.g = {0, 0, -standard_gravity};
@@ -45,33 +45,33 @@ double squared(const Way& way, const Way& truth) {
 TEST(LegMotionError, AnErrorOfOneStandardDeviationIsOneStandardDeviationOff) {
   for (const double turn : {0.0, 0.002, -0.003}) {
     SCOPED_TRACE(turn);
-    const Way truth = walked(1000, turn, {});
-    EXPECT_NEAR(squared(walked(1000, turn, {{0, mount, 0}, 0, 0}), truth), 1, 0.1);
-    EXPECT_NEAR(squared(walked(1000, turn, {{0, 0, mount}, 0, 0}), truth), 1, 0.1);
-    EXPECT_NEAR(squared(walked(1000, turn, {{0, 0, 0}, length, 0}), truth), 1, 0.1);
-    EXPECT_NEAR(squared(walked(1000, turn, {{0, 0, 0}, 0, gyro_scale}), truth), turn == 0 ? 0 : 1, 0.1);
+    const Way truth = way_of(1000, turn, {});
+    EXPECT_NEAR(squared(way_of(1000, turn, {{0, mount, 0}, 0, 0}), truth), 1, 0.1);
+    EXPECT_NEAR(squared(way_of(1000, turn, {{0, 0, mount}, 0, 0}), truth), 1, 0.1);
+    EXPECT_NEAR(squared(way_of(1000, turn, {{0, 0, 0}, length, 0}), truth), 1, 0.1);
+    EXPECT_NEAR(squared(way_of(1000, turn, {{0, 0, 0}, 0, gyro_scale}), truth), turn == 0 ? 0 : 1, 0.1);
   }
 }
 
 TEST(LegMotionError, AGyroThatWarmsUpTurnsTheWay) {
   constexpr double drift = 2e-5, dt = 0.05;  // of one standard deviation; 50 s
-  const Way truth = walked(1000, 0.002, {}, dt);
+  const Way truth = way_of(1000, 0.002, {}, dt);
   Error warming;
   warming.gyro_drift = drift;
-  EXPECT_NEAR(squared(walked(1000, 0.002, warming, dt), truth), 1, 0.1);
+  EXPECT_NEAR(squared(way_of(1000, 0.002, warming, dt), truth), 1, 0.1);
 }
 
 // Ten metres in a circle: a leg that is too long makes a larger circle, but a mount that is pitched climbs all the way.
 TEST(LegMotionError, AWayBackUndoesWhatItCan) {
   const double round = 2 * std::numbers::pi / 1000;
-  const Way there = walked(500, round, {}), back = walked(1000, round, {});
+  const Way there = way_of(500, round, {}), back = way_of(1000, round, {});
   const PoseCovariance half = there.error.error(there.end), whole = back.error.error(back.end);
   EXPECT_LT(whole(3, 3) + whole(4, 4), 0.5 * (half(3, 3) + half(4, 4)));
   EXPECT_NEAR(std::sqrt(whole(5, 5)), 10 * mount, 0.1 * mount);
 }
 
 TEST(LegMotionError, BeginsAnewWhereThePoseIsKnown) {
-  Way way = walked(100, 0.01, {});
+  Way way = way_of(100, 0.01, {});
   way.error.pose_is_measured(Eigen::Matrix3d::Zero());
   way.error.add(way.end, {}, 0, 0, false);
   EXPECT_TRUE(way.error.error(way.end).isZero(0));
@@ -79,7 +79,7 @@ TEST(LegMotionError, BeginsAnewWhereThePoseIsKnown) {
 
 // A corridor: the sweeps hold all but the position along x.
 TEST(LegMotionError, GoesOnAlongWhatNoSweepMeasures) {
-  Way way = walked(1000, 0.002, {});
+  Way way = way_of(1000, 0.002, {});
   const PoseCovariance before = way.error.error(way.end);
   way.error.pose_is_measured(Eigen::Vector3d(1, 0, 0).asDiagonal());
   const PoseCovariance after = way.error.error(way.end);

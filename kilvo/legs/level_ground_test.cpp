@@ -9,7 +9,7 @@ namespace kilvo {
 namespace {
 
 // A robot that sets down one foot after the other, 0.3 m along x and 0.2 m across, as its legs measure that.
-class Walk {
+class GroundWalk {
  public:
   double climb = 0;            // per metre of the way in the robot's frame: what the legs measure too much
   double slope = 0;            // of the ground along x of the world, true
@@ -53,14 +53,14 @@ class Walk {
 
 // One per cent of climb, as of an IMU that is pitched by 0.6 degrees: 180 mm on the way without the ground, 18 allowed.
 TEST(LevelGround, HoldsTheHeightOfARobotThatIsDescribedAsPitched) {
-  Walk walk;
+  GroundWalk walk;
   walk.climb = 0.01;
   EXPECT_TRUE(walk.walk(60));
   EXPECT_LT(std::abs(walk.foothold.z()), 0.018);
 }
 
 TEST(LevelGround, ASlopeIsNoLevelGround) {
-  Walk walk;
+  GroundWalk walk;
   walk.walk(20);
   walk.slope = 0.1;
   walk.walk(3);
@@ -70,7 +70,7 @@ TEST(LevelGround, ASlopeIsNoLevelGround) {
 
 // 2 % might be a wrong description, and are taken for that; 5 % are more than descriptions are off by.
 TEST(LevelGround, ARobotThatBeginsOnASlopeIsNotTakenForOneThatIsPitched) {
-  Walk walk;
+  GroundWalk walk;
   walk.slope = 0.05;
   walk.walk(10);
   for (int i = 0; i < 20; ++i) EXPECT_FALSE(walk.walk(1)) << i;
@@ -78,7 +78,7 @@ TEST(LevelGround, ARobotThatBeginsOnASlopeIsNotTakenForOneThatIsPitched) {
 }
 
 TEST(LevelGround, AStairLeadsToAnotherFloor) {
-  Walk walk;
+  GroundWalk walk;
   const auto below = walk.walk(20);
   ASSERT_TRUE(below);
   walk.foothold.z() += 0.15;
@@ -90,7 +90,7 @@ TEST(LevelGround, AStairLeadsToAnotherFloor) {
 
 // Until the vertical is settled the ground tells of gravity, too; the world is levelled by what it is after 14 s of walking at the latest.
 TEST(LevelGround, SettlesTheVerticalWhenGravityIsKnownOrAfterAWhile) {
-  Walk known, unknown;
+  GroundWalk known, unknown;
   known.walk(10);
   EXPECT_TRUE(known.ground.vertical());
   EXPECT_FALSE(known.walk(1)->measures_gravity);
@@ -103,7 +103,7 @@ TEST(LevelGround, SettlesTheVerticalWhenGravityIsKnownOrAfterAWhile) {
 
 // The rows of a floor hold the height over it; what was not known of the height when it began stays unknown.
 TEST(LevelGround, TheHeightOfAFloorIsAsUncertainAsItWasWhenTheFloorWasBegun) {
-  Walk walk;
+  GroundWalk walk;
   walk.walk(20);
   EXPECT_EQ(walk.ground.floor_variance(), 0);
   walk.height_sigma = 0.05;
@@ -118,7 +118,7 @@ TEST(LevelGround, TheHeightOfAFloorIsAsUncertainAsItWasWhenTheFloorWasBegun) {
 }
 
 TEST(LevelGround, NothingIsLeftOfAFloorAfterARestart) {
-  Walk walk;
+  GroundWalk walk;
   ASSERT_TRUE(walk.walk(20));
   walk.foothold.z() += 1;
   walk.ground.restart();

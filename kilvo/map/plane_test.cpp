@@ -14,11 +14,11 @@ constexpr double max_roughness = 0.01;  // m
 std::optional<Plane> fit(const Moments& moments, const Eigen::Vector3d& origin) { return fit_plane(moments, origin, 8, max_roughness); }
 
 // A rectangle of 0.9 m x 0.5 m somewhere.
-struct Patch {
+struct FlatPatch {
   Eigen::Vector3d centre, n, u, v;
 };
 
-Patch random_patch(test::Random& random) {
+FlatPatch random_patch(test::Random& random) {
   const Eigen::Matrix3d R = random.rotation().matrix();
   return {random.vector3(20), R.col(0), R.col(1), R.col(2)};
 }
@@ -29,7 +29,7 @@ Moments moments_of(const std::vector<PointGroup>& groups, const Eigen::Vector3d&
   return m;
 }
 
-std::vector<PointGroup> noisy_points(test::Random& random, const Patch& p, int count, double sigma) {
+std::vector<PointGroup> noisy_points(test::Random& random, const FlatPatch& p, int count, double sigma) {
   std::vector<PointGroup> groups;
   for (int i = 0; i < count; ++i) {
     PointGroup g;
@@ -44,7 +44,7 @@ std::vector<PointGroup> noisy_points(test::Random& random, const Patch& p, int c
 TEST(FitPlane, FindsAnExactPlaneExactly) {
   test::Random random(1);
   for (int i = 0; i < 50; ++i) {
-    const Patch p = random_patch(random);
+    const FlatPatch p = random_patch(random);
     const Eigen::Vector3d origin = p.centre + random.vector3(0.3);
     const auto groups = test::groups_of(test::points_on(p.centre - 0.45 * p.u - 0.25 * p.v, 0.9 * p.u, 0.5 * p.v, 0.05), 0.25, 0.001);
     const auto plane = fit(moments_of(groups, origin), origin);
@@ -65,7 +65,7 @@ TEST(FitPlane, ErrorsAreAsLargeAsItsCovarianceSays) {
     double sum = 0;
     int used = 0;
     while (used < trials) {
-      const Patch p = random_patch(random);
+      const FlatPatch p = random_patch(random);
       const auto plane = fit(moments_of(noisy_points(random, p, count, 0.02), p.centre), p.centre);
       ASSERT_TRUE(plane);
       // Points thicker by chance than their noise count as a rough surface, whose covariance is wider on purpose. Thickness and errors of
@@ -98,7 +98,7 @@ Eigen::Matrix<double, 6, 6> covariance_of(const Plane& plane) {
 TEST(FitPlane, VarianceUnderAPointIsOffsetAndTilt) {
   test::Random random(3);
   for (int i = 0; i < 20; ++i) {
-    const Patch p = random_patch(random);
+    const FlatPatch p = random_patch(random);
     const auto plane = fit(moments_of(noisy_points(random, p, 100, 0.02), p.centre), p.centre);
     ASSERT_TRUE(plane);
     const Eigen::Matrix<double, 6, 6> C = covariance_of(*plane);
@@ -115,7 +115,7 @@ TEST(FitPlane, VarianceUnderAPointIsOffsetAndTilt) {
 TEST(FitPlane, ARoughSurfaceIsAPlaneOfThatRoughnessUntilItIsTooRough) {
   test::Random random(4);
   for (const double bumps : {0.02, 0.06}) {
-    const Patch p = random_patch(random);
+    const FlatPatch p = random_patch(random);
     std::vector<PointGroup> groups = noisy_points(random, p, 1000, bumps);
     for (PointGroup& g : groups) g.noise = 0.005 * 0.005 * Eigen::Matrix3d::Identity();
     const auto plane = fit(moments_of(groups, p.centre), p.centre);
@@ -126,7 +126,7 @@ TEST(FitPlane, ARoughSurfaceIsAPlaneOfThatRoughnessUntilItIsTooRough) {
 
 TEST(FitPlane, FewerPointsThanAskedForMakeNoPlane) {
   test::Random random(5);
-  const Patch p = random_patch(random);
+  const FlatPatch p = random_patch(random);
   const auto groups = noisy_points(random, p, 8, 0.001);
   EXPECT_TRUE(fit(moments_of(groups, p.centre), p.centre));
   EXPECT_FALSE(fit(moments_of({groups.begin(), groups.begin() + 7}, p.centre), p.centre));
