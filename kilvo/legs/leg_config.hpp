@@ -11,7 +11,7 @@ namespace kilvo {
 struct LegConfig {
   std::string contact = "kilvo";           // kilvo | paper | variance | force
   double velocity_sigma = 0.005;           // m/s
-  double vertical_velocity_sigma = 0.025;  // m/s
+  double vertical_velocity_sigma = 0.015;  // m/s
   double velocity_correlation = 0.2;       // s
   double position_sigma = 0.0005;          // m
   double position_correlation = 0.5;       // s
