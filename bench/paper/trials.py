@@ -197,7 +197,9 @@ def changes_of(rows: list[list[float]], begin: float, end: float) -> list[list[f
 class Trials:
     """Of one recording. A run is made once, however many tables ask for it."""
 
-    def __init__(self, kilvo: str, recording: dict, scratch: str, settings: list[str], duration: float | None):
+    def __init__(self, kilvo: str, recording: dict, scratch: str, settings: list[str], duration: float | None,
+                 sensors: str | None = None):
+        """`sensors`: those in the recording, where it has fewer than the configuration."""
         self.kilvo, self.recording, self.scratch, self.settings, self.duration = kilvo, recording, scratch, settings, duration
         self.truth = poses_of(recording["truth"])
         if not self.truth:
@@ -205,7 +207,7 @@ class Trials:
         self._known: dict = {}
         self.distrusted: list[str] = []  # runs that kilvo itself ends as failed, and why
         with open(recording["config"], encoding="utf-8") as file:
-            sections = {line.split(":")[0] for line in file if line[:1].isalpha()}
+            sections = sensors.split(",") if sensors else {line.split(":")[0] for line in file if line[:1].isalpha()}
         self.modalities = [m for m, sensors in MODALITIES.items() if all(s in sections for s in sensors.split(","))]
         self._begin: float | None = None
 
@@ -354,13 +356,16 @@ def cut_to(kilvo: str, walk: str, most: float | None, folder: str) -> list[str]:
     return ["--duration", f"{most:g}"] if float(re.search(r": ([0-9.]+) s of '", said).group(1)) > most else []
 
 
-def legs_alone(kilvo: str, walk: str, seed: int, level: int, length: list[str], folder: str, settings: list[str]) -> dict | None:
-    """Drift of legs and IMU alone on a walk that is made for it, of a robot as it is described (level 0) or one that is kept well (1)."""
-    made = os.path.join(folder, f"legs_{walk}_{seed}_{level}")
-    output_of([kilvo, "simulate", walk, "--out", made, "--seed", str(seed), "--rough", str(level), *length, "--sensors", "legs,imu", "--quiet"])
+def legs_alone(kilvo: str, walk: str, seed: int, level: int, until_lost: bool, length: list[str], folder: str, settings: list[str]) -> dict | None:
+    """Drift of legs and IMU alone on a walk that is made for it, of a robot as it is described (level 0) or one that is kept well (1): from the
+    start, or `until_lost` with a LiDAR, as long before the end as the paper loses it for good."""
+    made = os.path.join(folder, f"legs_{walk}_{seed}_{level}_{until_lost:d}")
+    sensors = MODALITIES["KIL" if until_lost else "KI"]
+    output_of([kilvo, "simulate", walk, "--out", made, "--seed", str(seed), "--rough", str(level), *length, "--sensors", sensors, "--quiet"])
     recording = {"bag": os.path.join(made, "recording.bag"), "truth": os.path.join(made, "gt.tum"), "config": os.path.join(made, "config.yaml")}
     try:
-        return Trials(kilvo, recording, os.path.join(made, "runs"), settings, None).run("KI").drift()
+        of = Trials(kilvo, recording, os.path.join(made, "runs"), settings, None, sensors)
+        return of.run("KIL", of.drops(UNRECOVERABLE)).drift(of.begin + UNRECOVERABLE[1][1] * of.lasts) if until_lost else of.run("KI").drift()
     finally:
         shutil.rmtree(made, ignore_errors=True)
 
