@@ -65,7 +65,8 @@ TEST(SoleNoise, TwoSolesThatBothRiseByMuchShowAnErrorOfTheStateAtOnce) {
   EXPECT_EQ(stances.walk(30, 0, 0), 0);
   EXPECT_FALSE(stances.stand(0, wrong));
   EXPECT_NEAR(stances.stand(1, wrong).value_or(0), wrong, 0.2 * wrong);
-  EXPECT_EQ(stances.noise.vertical(), LegConfig().vertical_velocity_sigma) << "it is no noise";
+  // The first of the two differs from the one before it.
+  EXPECT_LT(stances.noise.vertical(), 0.2 * wrong) << "it is no noise";
 }
 
 TEST(SoleNoise, OneSoleThatRisesIsNoErrorOfTheState) {
