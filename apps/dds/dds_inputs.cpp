@@ -171,6 +171,8 @@ void DdsInputs::note(const Publisher& publisher, bool is_alive) {
 // Why a publisher cannot be heard; empty: it can, and there is a reader for it.
 std::string DdsInputs::misfit_of(Subscription& subscription, const Publisher& publisher) {
   const Sensor sensor = subscription.sensors.front();
+  if (publisher.type == "unitree_go/LowState")
+    return "a publisher sends unitree_go/LowState: the robot has four feet (Go2, B2); KILVO's legs are the two of a humanoid";
   const DdsType* type = find_type(publisher.type);
   const bool fits =
       type != nullptr && std::ranges::any_of(subscription.sensors, [&](Sensor s) { return lab::is_type_of(s, publisher.type); });
