@@ -217,9 +217,10 @@ void DdsInputs::take(Reader& reader) {
   for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(0, count)); ++i) {
     const SerializedBytes message(messages[i]);
     if (!infos[i].valid_data) continue;
+    const Time arrived = now + Duration(i);  // messages that are taken at once are not one message
     for (const Sensor sensor : reader.subscription->sensors) {
       if (lab::is_type_of(sensor, reader.type->name))
-        inputs_.receive(sensor, {reader.type->name, {message.bytes(), lab::Encoding::cdr}, now}, reader.subscription->is_compressed);
+        inputs_.receive(sensor, {reader.type->name, {message.bytes(), lab::Encoding::cdr}, arrived}, reader.subscription->is_compressed);
     }
   }
 }

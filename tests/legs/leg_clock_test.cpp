@@ -256,6 +256,15 @@ TEST(LegClock, CostsKiNoDriftOnceItIsFound) {
   }
 }
 
+TEST(DeviceClock, SamplesThatAreReceivedAtOnceAreSeveral) {
+  DeviceClock clock(0.002);
+  const auto ms = [](int n) { return std::chrono::milliseconds(n); };
+  const Time arrived = time_from_ns(1'000'000'000), first = clock.follow(ms(2), arrived);
+  EXPECT_EQ(clock.follow(ms(2), arrived), first) << "the IMU of the same message";
+  EXPECT_NEAR(to_seconds(clock.follow(ms(4), arrived) - first), 0.002, 1.1e-3);
+  EXPECT_NE(clock.follow(ms(4), arrived), first);
+}
+
 TEST(TickCounter, WrapsAround) {
   TickCounter counter;
   const Duration first = counter.unwrapped(0xFFFFFFFEU), later = counter.unwrapped(3);
