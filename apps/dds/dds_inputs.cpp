@@ -171,6 +171,8 @@ void DdsInputs::note(const Publisher& publisher, bool is_alive) {
 // Why a publisher cannot be heard; empty: it can, and there is a reader for it.
 std::string DdsInputs::misfit_of(Subscription& subscription, const Publisher& publisher) {
   const Sensor sensor = subscription.sensors.front();
+  if (publisher.type == "unitree_go/LowState")
+    return "a publisher sends unitree_go/LowState: the robot has four feet (Go2, B2); KILVO's legs are the two of a humanoid";
   const DdsType* type = find_type(publisher.type);
   const bool fits =
       type != nullptr && std::ranges::any_of(subscription.sensors, [&](Sensor s) { return lab::is_type_of(s, publisher.type); });
@@ -215,9 +217,10 @@ void DdsInputs::take(Reader& reader) {
   for (std::size_t i = 0; i < static_cast<std::size_t>(std::max(0, count)); ++i) {
     const SerializedBytes message(messages[i]);
     if (!infos[i].valid_data) continue;
+    const Time arrived = now + Duration(i);  // messages that are taken at once are not one message
     for (const Sensor sensor : reader.subscription->sensors) {
       if (lab::is_type_of(sensor, reader.type->name))
-        inputs_.receive(sensor, {reader.type->name, {message.bytes(), lab::Encoding::cdr}, now}, reader.subscription->is_compressed);
+        inputs_.receive(sensor, {reader.type->name, {message.bytes(), lab::Encoding::cdr}, arrived}, reader.subscription->is_compressed);
     }
   }
 }

@@ -98,18 +98,27 @@ void add_events(DiagnosticStatus& status, const EstimateState& e) {
   }
 }
 
+/// The sensors of which nothing comes; a topic on which nothing ever came may be misspelt.
+std::string lost_sensors(const Condition& c) {
+  std::string lost;
+  for (std::size_t i = 0; i < sensor_count; ++i) {
+    const auto sensor = static_cast<Sensor>(i);
+    const InputState& input = c.inputs[i];
+    if (input.topic.empty() || !trouble_of(sensor, c)) continue;
+    lost += (lost.empty() ? "" : ", ") + std::string(name_of(sensor));
+    if (!input.last) lost += fmt::format(" (no message on {} yet)", input.topic);
+  }
+  return lost;
+}
+
 DiagnosticStatus status_of_estimate(const Condition& c) {
   DiagnosticStatus out = named("estimator");
+  const std::string lost = lost_sensors(c);
   if (!c.estimate) {
-    say(out, DiagnosticStatus::warn, c.waiting_for.empty() ? "waiting for the first output" : c.waiting_for);
+    const std::string text = c.waiting_for.empty() ? "waiting for the first output" : c.waiting_for;
+    say(out, DiagnosticStatus::warn, lost.empty() ? text : fmt::format("{}, lost: {}", text, lost));
     for (const std::string& warning : warnings_of(c.seen)) add(out, "warning", warning);
     return out;
-  }
-  std::string lost;
-  for (int i = 0; i < sensor_count; ++i) {
-    const auto sensor = static_cast<Sensor>(i);
-    if (!c.inputs[static_cast<std::size_t>(i)].topic.empty() && trouble_of(sensor, c))
-      lost += (lost.empty() ? "" : ", ") + std::string(name_of(sensor));
   }
   const EstimateState& e = *c.estimate;
   std::uint8_t level = lost.empty() ? DiagnosticStatus::ok : DiagnosticStatus::warn;

@@ -136,6 +136,16 @@ TEST(Diagnostics, TellWhatTheStartWaitsFor) {
   c.estimate.reset();
   c.waiting_for = "waiting for the robot to stand still";
   EXPECT_EQ(message_of(statuses(c), "kilvo: estimator"), c.waiting_for);
+  c.inputs[0].last.reset();
+  EXPECT_EQ(message_of(statuses(c), "kilvo: estimator"), c.waiting_for + ", lost: imu (no message on /imu yet)");
+}
+
+TEST(Diagnostics, NameTheTopicOnWhichNothingEverCame) {
+  Condition c = all_is_well();
+  c.inputs[2].last.reset();
+  EXPECT_NE(message_of(statuses(c), "kilvo: estimator").find("lost: lidar (no message on /lidar yet)"), std::string::npos);
+  c.inputs[2].last = c.now - std::chrono::seconds(2);
+  EXPECT_EQ(message_of(statuses(c), "kilvo: estimator").find("/lidar"), std::string::npos) << "its name was right";
 }
 
 TEST(Diagnostics, ASensorThatTheRobotDoesNotHaveIsNotSpokenOf) {

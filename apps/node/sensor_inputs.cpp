@@ -9,6 +9,7 @@ namespace kilvo::node {
 namespace {
 
 constexpr std::size_t most_clouds = 20;  // that wait until it is known how their points' times are written
+constexpr std::size_t most_kinds = 100;  // of faults that are told
 // Images that come compressed are left out while the same come uncompressed.
 constexpr auto raw_is_near = std::chrono::seconds(1);
 
@@ -75,7 +76,7 @@ void SensorInputs::take(Sensor sensor, const Arrived& arrived) {
   if (measurement) {
     sink_(*std::move(measurement), arrived.at);
   } else {
-    complain(input, input.intake.first_fault());
+    complain(input, input.intake.newest_fault());
   }
 }
 
@@ -114,13 +115,14 @@ void SensorInputs::search_point_time(const Arrived& arrived) {
   for (const Held& cloud : clouds) take(Sensor::lidar, {cloud.type, {cloud.bytes, cloud.encoding}, cloud.at});
 }
 
-// Reported when it is another one than before.
+// Each kind is reported once: garbage has another fault in every message, and so many numbers in them.
 void SensorInputs::complain(Input& input, const std::string& fault) {
+  std::string kind = fault;
+  std::erase_if(kind, [](char c) { return c >= '0' && c <= '9'; });
   {
     const std::lock_guard lock(input.mutex);
     input.fault = fault;
-    if (input.said == fault) return;
-    input.said = fault;
+    if (input.said.size() >= most_kinds || !input.said.insert(kind).second) return;
   }
   say_(input.topic + ": " + fault);
 }

@@ -7,6 +7,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -76,8 +77,8 @@ class SensorInputs {
     std::optional<SteadyClock::time_point> last;
     std::optional<SteadyClock::time_point> raw_last;  // of the camera: uncompressed
     lab::SensorIntake intake;
-    std::string fault;  // of the newest message
-    std::string said;   // the last fault that the user was told
+    std::string fault;           // of the newest message
+    std::set<std::string> said;  // kinds of faults that the user was told, without their numbers
     std::string connection;
     std::optional<double> clock;
   };

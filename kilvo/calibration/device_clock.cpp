@@ -14,7 +14,7 @@ constexpr double longest_surprise = 0.2;
 }  // namespace
 
 Time DeviceClock::follow(std::optional<Duration> device, Time arrived) {
-  if (count_ > 0 && arrived == arrived_) return time_;  // another part of the same message
+  if (count_ > 0 && arrived == arrived_ && device == device_) return time_;  // another part of the same message
   const double passed = to_seconds(arrived - arrived_);
   double step = period_;
   bool counted = false;

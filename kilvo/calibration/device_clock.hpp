@@ -14,9 +14,8 @@ class DeviceClock {
   /// `period`: s, nominal, between samples.
   explicit DeviceClock(double period) : period_(period) {}
 
-  /// Of each sample, in the order of arrival: its time by the device's clock, if it has one, and when it arrived. Samples that arrived at
-  /// one time are of one message, and of one time. A device whose clock
-  /// stands still, or jumps, is taken for one without.
+  /// Of each sample, in the order of arrival: its time by the device's clock, if it has one, and when it arrived. Samples of one time by
+  /// both clocks are of one message. A device whose clock stands still, or jumps, is taken for one without.
   Time follow(std::optional<Duration> device, Time arrived);
 
  private:

@@ -15,7 +15,8 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
                                               const PointTimeFormat& point_time) {
   auto decoded = decode_measurement(sensor, type, message, point_time, with_colours_);
   if (!decoded) {
-    if (first_fault_.empty()) first_fault_ = decoded.reason();
+    newest_fault_ = decoded.reason();
+    if (first_fault_.empty()) first_fault_ = newest_fault_;
     ++counts_.dropped["undecodable"];
     return std::nullopt;
   }

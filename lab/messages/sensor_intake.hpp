@@ -47,12 +47,13 @@ class SensorIntake {
   const SensorCounts& counts() const { return counts_; }
   /// Why the first undecodable message was; empty without one.
   const std::string& first_fault() const { return first_fault_; }
+  const std::string& newest_fault() const { return newest_fault_; }
 
  private:
   double time_offset_;
   bool with_colours_;
   SensorCounts counts_;
-  std::string first_fault_;
+  std::string first_fault_, newest_fault_;
   std::optional<std::uint32_t> tick_;
   std::optional<Eigen::Vector3d> gyro_;
 };

@@ -66,7 +66,12 @@ StorageSummary JoinedReader::storage() const {
 
 void JoinedReader::select(const std::function<bool(const Channel&)>& wanted, Time from, Time until) {
   for (Part& part : parts_) {
-    part.reader->select([&](const Channel& channel) { return part.ids.contains(channel.id) && wanted(channel); }, from, until);
+    // The caller knows channels by the identifiers of this reader, not by those of the part.
+    const auto is_wanted = [&](const Channel& theirs) {
+      const auto ours = part.ids.find(theirs.id);
+      return ours != part.ids.end() && wanted(connections_.at(ours->second));
+    };
+    part.reader->select(is_wanted, from, until);
     part.head.reset();
     part.started = false;
   }

@@ -96,7 +96,7 @@ TEST_P(Mcap, CutAnywhereEverythingBeforeTheCutIsDelivered) {
   const McapLayout layout = read_mcap_layout(whole);
   const std::multiset<KeptMessage> originals(all.begin(), all.end());
   std::mt19937 random{1};
-  for (int i = 0; i < 150; ++i) {
+  for (int i = 0; i < 1000; ++i) {
     const std::size_t cut = mcap_magic.size() + random() % (content.size() - mcap_magic.size());
     bool damaged = false;
     const auto messages = messages_of(Content(content.begin(), content.begin() + static_cast<std::ptrdiff_t>(cut)), &damaged);
@@ -123,7 +123,7 @@ TEST_P(Mcap, AFlippedByteCostsAtMostItsChunk) {
     most_in_chunk = std::max(most_in_chunk, count);
   }
   std::mt19937 random{2};
-  for (int i = 0; i < 500; ++i) {
+  for (int i = 0; i < 1000; ++i) {
     const std::size_t at = mcap_magic.size() + random() % (content.size() - mcap_magic.size());
     Content flipped = content;
     flipped[at] = static_cast<std::uint8_t>(flipped[at] ^ (1U << random() % 8));

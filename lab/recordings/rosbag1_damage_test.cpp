@@ -76,7 +76,7 @@ class DamagedBag : public ::testing::TestWithParam<const char*> {
 TEST_P(DamagedBag, CutAnywhereEverythingBeforeTheCutIsDelivered) {
   std::multiset<KeptMessage> originals;
   for (const auto& m : placed) originals.insert(m.message);
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 1000; ++i) {
     const std::size_t cut = bag_magic.size() + random() % (content.size() - bag_magic.size());
     bool damaged = false;
     const auto delivered = read_content(Content(content.begin(), content.begin() + static_cast<std::ptrdiff_t>(cut)), &damaged);

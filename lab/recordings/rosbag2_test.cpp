@@ -72,7 +72,8 @@ TEST_F(Rosbag2, EveryFormatGivesTheSameMeasurementsInTheSameOrder) {
 TEST_F(Rosbag2, ABagComesBackFromEach) {
   convert("a.mcap", {Storage::mcap, Compression::zstd});
   convert("c.db3", {Storage::db3, Compression::message});
-  for (const std::string from : {"a.mcap", "c.db3"}) {
+  convert("split", {Storage::db3, Compression::none, true, 0.1});
+  for (const std::string from : {"a.mcap", "c.db3", "split"}) {
     const fs::path back = convert(from + ".bag", {Storage::bag, Compression::none}, from);
     const auto original = open_recording(folder / "walk.bag"), again = open_recording(back);
     while (const auto m = original->next()) {
@@ -137,6 +138,19 @@ TEST_F(Rosbag2, ConversionTakesTopicsAndAPartOfTheTime) {
   EXPECT_EQ(open_recording(folder / "part.mcap")->connections().size(), 1U);
 }
 
+TEST_F(Rosbag2, ConversionTakesTopicsOfAFolder) {
+  const auto reader = open_recording(convert("split", {Storage::db3, Compression::none, true, 0.1}));
+  for (const std::string& topic : tiny_topics) {
+    const auto writer = create_recording(folder / "one.mcap", {Storage::mcap, Compression::none});
+    const ConvertReport report = convert_recording(*reader, *writer, {{topic}, 0, 1e9, Encoding::cdr, false});
+    writer->close();
+    const auto expected = std::ranges::count(tiny_walk(), std::string(topic), [](const Measurement& m) {
+      return std::string(tiny_topics[static_cast<std::size_t>(sensor_of(m))]);
+    });
+    EXPECT_EQ(report.messages, static_cast<std::uint64_t>(expected)) << topic;
+  }
+}
+
 TEST_F(Rosbag2, WhatABagCannotHoldIsLeftOutWithAReason) {
   const auto writer = create_recording(folder / "x.db3", {Storage::db3, Compression::none});
   const auto id = writer->add_channel({0, "/odd", "made_up/Type", {}, {}, Encoding::cdr});
@@ -160,7 +174,7 @@ TEST_F(DamagedDb3, CutAnywhereWhatIsThereIsRight) {
   const std::multiset<KeptMessage> originals(all.begin(), all.end());
   std::mt19937 random{3};
   std::size_t read = 0;
-  for (int i = 0; i < 150; ++i) {
+  for (int i = 0; i < 1000; ++i) {
     const std::size_t cut = random() % content.size();
     try {
       Db3Reader reader{FileBytes(Content(content.begin(), content.begin() + static_cast<std::ptrdiff_t>(cut)))};
@@ -179,7 +193,7 @@ TEST_F(DamagedDb3, CutAnywhereWhatIsThereIsRight) {
 TEST_F(DamagedDb3, FlippedBitsDoNoHarm) {
   const Content content = file_content(convert("walk.db3", {Storage::db3, Compression::message}));
   std::mt19937 random{4};
-  for (int i = 0; i < 500; ++i) {
+  for (int i = 0; i < 1000; ++i) {
     Content flipped = content;
     flipped[random() % content.size()] ^= static_cast<std::uint8_t>(1U << random() % 8);
     try {

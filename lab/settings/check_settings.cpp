@@ -37,6 +37,17 @@ void check_value(const Settings& s, const Setting& setting) {
   }
 }
 
+/// Letters, digits and _, none of them empty or with a digit first; / between them.
+bool is_ros_name(const std::string& name) {
+  char before = '/';
+  for (const char c : name) {
+    const bool is_letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_', is_digit = c >= '0' && c <= '9';
+    if (before == '/' ? !is_letter : !(is_letter || is_digit || c == '/')) return false;
+    before = c;
+  }
+  return before != '/';
+}
+
 void check_together(const Settings& s, Problems& problems) {
   const auto complain = [&](const std::string& key, const std::string& why) { problems.collect([&] { refuse(s, key, why); }); };
   // Which of the two a user touched is where to point at.
@@ -60,6 +71,8 @@ void check_together(const Settings& s, Problems& problems) {
   for (const double k : s.robot.camera.distortion) {
     if (std::abs(k) > no_lens) complain("camera.distortion", fmt::format("must be numbers of a lens, not {:g}", k));
   }
+  if (!is_ros_name(s.live.name))
+    complain("live.name", fmt::format("must be a name of ROS (letters, digits and _; / between names), not '{}'", s.live.name));
   const std::size_t n = s.robot.camera.distortion.size();
   const bool radtan = s.robot.camera.model == "pinhole_radtan";
   if (n != 0 && n != 4 && !(radtan && n == 5)) {

@@ -86,15 +86,21 @@ inline RawMessage image_message(const CameraImage& s) {
   return out.message();
 }
 
-/// unitree_hg/LowState: the joints at the places of a G1 with 29, the pelvis' gyroscope, a counter and no checksum.
-inline RawMessage low_state_message(const JointSample& s, const Eigen::Vector3d& gyro, std::uint32_t tick) {
+/// What a LowState says of the robot.
+struct LowStateModes {
+  std::uint8_t pr = 0, machine = 5;
+  std::uint32_t crc = 0;
+};
+
+/// unitree_hg/LowState: the joints at the places of a G1 with 29, the pelvis' gyroscope, a counter.
+inline RawMessage low_state_message(const JointSample& s, const Eigen::Vector3d& gyro, std::uint32_t tick, const LowStateModes& modes) {
   static constexpr std::array<const char*, 13> places{
       "left_hip_pitch_joint",    "left_hip_roll_joint",    "left_hip_yaw_joint",   "left_knee_joint",     "left_ankle_pitch_joint",
       "left_ankle_roll_joint",   "right_hip_pitch_joint",  "right_hip_roll_joint", "right_hip_yaw_joint", "right_knee_joint",
       "right_ankle_pitch_joint", "right_ankle_roll_joint", "waist_yaw_joint"};
   CdrBuffer out;
   Cdr& cdr = out.cdr();
-  cdr << std::uint32_t{0} << std::uint32_t{0} << std::uint8_t{0} << std::uint8_t{5} << tick;
+  cdr << std::uint32_t{0} << std::uint32_t{0} << modes.pr << modes.machine << tick;
   cdr << std::array<float, 4>{1, 0, 0, 0};
   cdr << std::array<float, 3>{static_cast<float>(gyro.x()), static_cast<float>(gyro.y()), static_cast<float>(gyro.z())};
   cdr << std::array<float, 3>{0, 0, 9.8F} << std::array<float, 3>{} << std::int16_t{40};
@@ -106,7 +112,7 @@ inline RawMessage low_state_message(const JointSample& s, const Eigen::Vector3d&
         << 0.0F;
     cdr << std::array<std::int16_t, 2>{} << 48.0F << std::array<std::uint32_t, 2>{} << std::uint32_t{0} << std::array<std::uint32_t, 4>{};
   }
-  cdr << std::array<std::uint8_t, 40>{} << std::array<std::uint32_t, 4>{} << std::uint32_t{0};
+  cdr << std::array<std::uint8_t, 40>{} << std::array<std::uint32_t, 4>{} << modes.crc;
   return out.message();
 }
 

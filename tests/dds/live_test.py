@@ -19,8 +19,10 @@ SECONDS = 6.0  # of the walk
 
 class Program:
     """A child whose words are kept."""
+    running: list = []
 
     def __init__(self, *command: str):
+        self.running.append(self)
         self.log = tempfile.NamedTemporaryFile("w+", suffix=".log", delete=False)
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.log, text=True)
 
@@ -31,7 +33,8 @@ class Program:
     def end(self, how: int = signal.SIGINT) -> int:
         if self.process.poll() is None:
             self.process.send_signal(how)
-        self.out, _ = self.process.communicate(timeout=60)
+        if self.process.stdout is not None and not self.process.stdout.closed:
+            self.out, _ = self.process.communicate(timeout=60)
         return self.process.returncode
 
 
@@ -80,6 +83,12 @@ STORY: Story
 
 
 class LiveTest(unittest.TestCase):
+    def tearDown(self):
+        # What a test that failed leaves behind would speak into the next one.
+        for program in Program.running:
+            program.end(signal.SIGKILL)
+        Program.running.clear()
+
     def heard(self, listener: Program) -> dict:
         listener.process.wait(120)
         listener.end()
@@ -137,6 +146,21 @@ class LiveTest(unittest.TestCase):
         self.assertEqual(live.end(), 0, live.said())
         self.assertGreater(heard["contacts"], 200, live.said())
         self.assertGreater(heard["odometry"], 300)
+        self.assertNotIn("duplicate", live.said())  # messages that are taken at once
+
+    def test_c2_a_low_state_that_is_none_is_named(self):
+        live = STORY.live("--set", "legs.topic=rt/lowstate", "--set", "legs.clock=estimated", "--set", "legs.gyro_link=pelvis")
+        for words, text in ((("--crc", "12345"), "rt/lowstate: unitree_hg/LowState: the checksum is wrong"),
+                            (("--mode-pr", "1"), "mode_pr is 1: ankles and waist are angles of motors"),
+                            (("--mode-machine", "9"), "mode_machine 9 is no robot")):
+            STORY.play("--only", "legs", "--legs", "lowstate", "--seconds", "1", *words).process.wait(30)
+            self.assertIn(text, live.said())
+        dog = STORY.peer("wrong-type", STORY.domain, "2", "rt/lowstate", "unitree_go::msg::dds_::LowState_")
+        self.assertTrue(wait_until(lambda: "the robot has four feet" in live.said()), live.said())
+        dog.end()
+        STORY.play("--only", "imu,legs", "--legs", "lowstate", "--seconds", "3").process.wait(30)
+        self.assertIn("KI (", live.said())
+        self.assertEqual(live.end(), 0, live.said())
 
     def test_e_images_services_and_the_record(self):
         record, map_file = os.path.join(STORY.folder, "record.mcap"), os.path.join(STORY.folder, "map.ply")
@@ -186,6 +210,23 @@ class LiveTest(unittest.TestCase):
                 file.writelines(part)
             self.assertGreater(len(part), 300)
             self.assertLess(self.error_of(name), 0.02, name)
+
+    def test_d_a_topic_on_which_nothing_comes_is_named(self):
+        live = STORY.live("--set", "lidar.topic=/pionts")
+        self.assertTrue(wait_until(lambda: "lost: imu (no message on /imu yet), legs (no message on /joint_states yet)" in live.said()), live.said())
+        STORY.play("--seconds", "3").process.wait(30)
+        self.assertEqual(live.end(), 0, live.said())
+        self.assertIn("KI (", live.said())
+        self.assertIn("lidar (no message on /pionts yet)", live.said())
+
+    def test_d_without_a_network_it_says_so(self):
+        alone = ("unshare", "--net", "--map-root-user")
+        if subprocess.run([*alone, "true"], capture_output=True, check=False).returncode != 0:
+            self.skipTest("no namespaces here")
+        program = Program(*alone, ARGUMENTS.kilvo, "live", "--config", STORY.config, "--domain", STORY.domain)
+        program.process.wait(30)
+        self.assertEqual(program.end(), 2, program.said())
+        self.assertIn("failed to find interfaces", program.said())
 
     def test_d_what_cannot_be_is_refused(self):
         for words, text in ((("--interface", "no_such_interface"), "cannot be entered"), (("--set", "live.base=tail"), "nearest is")):

@@ -1,11 +1,13 @@
 // The other side of `kilvo live` in tests: Fast DDS, which is another vendor's, plays a recording as a robot would, and listens.
 //
-//   peer play BAG DOMAIN [--legs lowstate] [--stamps recorded] [--start S] [--seconds S] [--only imu,legs,lidar,camera]
-//   peer listen DOMAIN FILE.tum SECONDS     odometry into a file; at the end a line of JSON: how many of what
-//   peer call DOMAIN SERVICE [0|1]          asks a service as rmw_cyclonedds does (kilvo/save_map; kilvo/pause/lidar 1); its answer as JSON
-//   peer garbage DOMAIN SECONDS             bytes that are no Imu, on the IMU's topic
-//   peer wrong-type DOMAIN SECONDS          clouds of a type that the LiDAR's topic should not have
-//   peer picky DOMAIN SECONDS               a reader that asks for more durability than there is
+//   peer play BAG DOMAIN [--legs lowstate [--mode-pr N] [--mode-machine N] [--crc N]] [--stamps recorded] [--start S] [--seconds S] [--only
+//   imu,legs,lidar,camera]
+//                                           a line of JSON when it begins: ns of that, and by how much stamps are later than recorded
+//   peer listen DOMAIN FILE.tum SECONDS     odometry into a file, the smooth one into FILE.tum.smooth; at the end a line of JSON: how many
+//   of what peer call DOMAIN SERVICE [0|1]          asks a service as rmw_cyclonedds does (kilvo/save_map; kilvo/pause/lidar 1); its answer
+//   as JSON peer garbage DOMAIN SECONDS             bytes that are no Imu, on the IMU's topic peer wrong-type DOMAIN SECONDS clouds of a
+//   type that the LiDAR's topic should not have peer picky DOMAIN SECONDS               a reader that asks for more durability than there
+//   is
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -109,6 +111,9 @@ class Player {
         with_low_state_(words.option("--legs", "") == "lowstate"),
         as_recorded_(words.option("--stamps", "") == "recorded"),
         source_(words.plain.at(1), options_of(words)) {
+    modes_.pr = static_cast<std::uint8_t>(std::stoi(words.option("--mode-pr", "0")));
+    modes_.machine = static_cast<std::uint8_t>(std::stoi(words.option("--mode-machine", "5")));
+    modes_.crc = static_cast<std::uint32_t>(std::stoul(words.option("--crc", "0")));
     const std::string only = words.option("--only", "imu,legs,lidar");
     if (only.find("imu") != std::string::npos) imu_ = peer_.writer("rt/imu", "sensor_msgs::msg::dds_::Imu_", false);
     if (only.find("legs") != std::string::npos)
@@ -121,11 +126,14 @@ class Player {
 
   void play() {
     const Time began = wall_now();
-    std::printf("{\"began\": %.6f}\n", to_seconds(began.time_since_epoch()));
-    std::fflush(stdout);
     std::optional<Time> first;
     while (auto m = source_.next()) {
-      if (!first) first = source_.recorded();
+      if (!first) {
+        first = source_.recorded();
+        std::printf("{\"began\": %lld, \"later_by\": %lld}\n", static_cast<long long>(to_ns(began)),
+                    static_cast<long long>((began - *first).count()));
+        std::fflush(stdout);
+      }
       const Time due = began + (source_.recorded() - *first);
       if (const auto wait = due - wall_now(); wait.count() > 0) std::this_thread::sleep_for(wait);
       send(moved(*std::move(m), as_recorded_ ? Duration(0) : began - *first));
@@ -157,7 +165,7 @@ class Player {
       // Of a 500 Hz robot every second sample. Its clock is its own.
       if (with_low_state_ && ++count_ % 2 != 0) return;
       const auto tick = static_cast<std::uint32_t>(to_ns(joints->t) / 1'000'000 + 12'345'678);
-      message = with_low_state_ ? low_state_message(*joints, pelvis_rate(*joints), tick) : joint_state_message(*joints);
+      message = with_low_state_ ? low_state_message(*joints, pelvis_rate(*joints), tick, modes_) : joint_state_message(*joints);
     } else if (const auto* scan = std::get_if<LidarScan>(&m)) {
       writer = lidar_;
       message = cloud_message(*scan);
@@ -179,6 +187,7 @@ class Player {
 
   Peer peer_;
   bool with_low_state_, as_recorded_;
+  LowStateModes modes_;
   lab::RecordingSource source_;
   DataWriter *imu_ = nullptr, *legs_ = nullptr, *lidar_ = nullptr, *camera_ = nullptr;
   ImuSample newest_;
@@ -204,32 +213,38 @@ class Ear final : public DataReaderListener {
   std::function<void(std::vector<char>&)> take_;
 };
 
+/// An odometry message as a line of the file; its stamp.
+Time keep_pose(std::vector<char>& bytes, std::ofstream& file) {
+  eprosima::fastcdr::FastBuffer buffer(bytes.data(), bytes.size());
+  Cdr cdr(buffer, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
+  cdr.read_encapsulation();
+  std::int32_t seconds = 0;
+  std::uint32_t nanoseconds = 0;
+  std::string frame, child;
+  std::array<double, 7> p{};
+  cdr >> seconds >> nanoseconds >> frame >> child >> p;
+  char line[256];
+  std::snprintf(line, sizeof line, "%d.%09u %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", seconds, nanoseconds, p[0], p[1], p[2], p[3], p[4], p[5],
+                p[6]);
+  file << line;
+  return time_from_ns(std::int64_t{seconds} * 1'000'000'000 + nanoseconds);
+}
+
 int listen(const Words& words) {
-  std::ofstream file(words.plain.at(2));
+  std::ofstream file(words.plain.at(2)), smooth_file(words.plain.at(2) + ".smooth");
   std::vector<double> late;
   Time first{}, last{};
   int poses = 0;
   double largest_gap = 0;
   Ear odometry([&](std::vector<char>& bytes) {
-    eprosima::fastcdr::FastBuffer buffer(bytes.data(), bytes.size());
-    Cdr cdr(buffer, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
-    cdr.read_encapsulation();
-    std::int32_t seconds = 0;
-    std::uint32_t nanoseconds = 0;
-    std::string frame, child;
-    std::array<double, 7> p{};
-    cdr >> seconds >> nanoseconds >> frame >> child >> p;
-    const Time t = time_from_ns(std::int64_t{seconds} * 1'000'000'000 + nanoseconds);
+    const Time t = keep_pose(bytes, file);
     late.push_back(to_seconds(wall_now() - t));
     if (poses++ == 0) first = t;
     if (poses > 1) largest_gap = std::max(largest_gap, to_seconds(t - last));
     last = t;
-    char line[256];
-    std::snprintf(line, sizeof line, "%d.%09u %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", seconds, nanoseconds, p[0], p[1], p[2], p[3], p[4],
-                  p[5], p[6]);
-    file << line;
   });
-  Ear smooth, transforms, clouds, contacts, path, diagnostics;
+  Ear smooth([&](std::vector<char>& bytes) { keep_pose(bytes, smooth_file); });
+  Ear transforms, clouds, contacts, path, diagnostics;
   Peer peer(std::stoi(words.plain.at(1)));
   peer.reader("rt/kilvo/odometry", "nav_msgs::msg::dds_::Odometry_", &odometry);
   peer.reader("rt/kilvo/odometry_smooth", "nav_msgs::msg::dds_::Odometry_", &smooth);
@@ -258,7 +273,10 @@ int disturb(const Words& words) {
   Ear ear;
   DataWriter* writer = nullptr;
   if (words.plain.at(0) == "garbage") writer = peer.writer("rt/imu", "sensor_msgs::msg::dds_::Imu_", false);
-  if (words.plain.at(0) == "wrong-type") writer = peer.writer("rt/points", "sensor_msgs::msg::dds_::LaserScan_", true);
+  if (words.plain.at(0) == "wrong-type") {
+    const bool named = words.plain.size() > 4;
+    writer = peer.writer(named ? words.plain[3] : "rt/points", named ? words.plain[4] : "sensor_msgs::msg::dds_::LaserScan_", true);
+  }
   if (words.plain.at(0) == "picky") peer.reader("rt/kilvo/odometry", "nav_msgs::msg::dds_::Odometry_", &ear, true);
   std::mt19937 random(1);
   const auto end = Wall::now() + std::chrono::duration_cast<Wall::duration>(std::chrono::duration<double>(seconds));

@@ -6,6 +6,9 @@
 #include <iterator>
 #include <optional>
 
+#include "kilvo/estimator/estimator.hpp"
+#include "lab/settings/settings.hpp"
+#include "lab/simulation/description.hpp"
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo {
@@ -44,10 +47,11 @@ struct Event {
 // A walk as a robot's computer receives it.
 class Walk {
  public:
-  explicit Walk(double duration) : config_(test::only({Sensor::imu, Sensor::legs}, duration)) {
+  explicit Walk(double duration, const char* scenario = "room") : config_(test::only({Sensor::imu, Sensor::legs}, duration)) {
     config_.joints.delivery.rate = 500;
-    lab::Simulator simulator(test::scenario("room"), config_);
+    lab::Simulator simulator(test::scenario(scenario), config_);
     start_ = simulator.start();
+    walk_.emplace(simulator.walk());
     while (auto m = simulator.next()) {
       if (std::holds_alternative<ImuSample>(*m)) truth_.push_back(simulator.imu_truth());
       measured_.push_back({simulator.measured(), *std::move(m)});
@@ -55,6 +59,7 @@ class Walk {
   }
   const lab::SimulatorConfig& config() const { return config_; }
   Time start() const { return start_; }
+  SE3 pose_at(double seconds) const { return walk_->imu(seconds); }
 
   std::vector<Event> with(const Fault& fault) const {
     lab::Random random(7, 1);
@@ -94,6 +99,7 @@ class Walk {
 
   lab::SimulatorConfig config_;
   Time start_;
+  std::optional<lab::Walk> walk_;
   std::vector<std::pair<Time, Measurement>> measured_;
   std::vector<lab::ImuTruth> truth_;
 };
@@ -188,6 +194,75 @@ TEST(LegClock, StampLeavesTheTimeAsItIs) {
   Measurement m = sample;
   EXPECT_EQ(clock.follow(m, time_from_ns(9)), nullptr);
   EXPECT_EQ(to_ns(stamp_of(m)), 5);
+}
+
+// ---- what the legs' clock does to the odometry of encoders and IMU
+
+struct Drift {
+  double whole = 0, walked = 0;  // m: rms of the position from the start; from when every clock is found
+};
+
+// `fault`: the legs have no stamps, and a clock finds them; nothing: the true stamps.
+Drift drift_of(const Walk& walk, const std::optional<Fault>& fault) {
+  const lab::SimulatorConfig& config = walk.config();
+  const lab::Settings settings =
+      lab::parse_settings(lab::simulated_config(config, "sim.urdf"), "simulated", std::string(KILVO_SOURCE_DIR) + "/config/robots");
+  LegClockConfig clock_config;
+  clock_config.clock = fault ? "estimated" : "stamp";
+  clock_config.gyro_link = "pelvis";
+  LegClock clock(clock_config, settings.robot);
+  Estimator estimator(settings.robot, settings.estimator, config.use);
+  std::vector<Output> outputs;
+  for (Event& event : walk.with(fault.value_or(Fault{}))) {
+    if (fault && clock.follow(event.m, event.arrived, event.low_level) != nullptr) continue;
+    if (auto* joints = std::get_if<JointSample>(&event.m); joints != nullptr && !fault) joints->t = event.truth;
+    estimator.push(std::move(event.m), outputs);
+  }
+  Drift out;
+  for (const double from : {0.0, 13.4}) {
+    double sum = 0, n = 0;
+    std::optional<SE3> T_WR;
+    for (const Output& o : outputs) {
+      const double since = to_seconds(o.t - walk.start());
+      if (since < from) continue;
+      const SE3 truth = walk.pose_at(since);
+      if (!T_WR) T_WR = o.x.pose() * truth.inverse();
+      sum += ((*T_WR * truth).p - o.x.p).squaredNorm();
+      ++n;
+    }
+    (from > 0 ? out.walked : out.whole) = std::sqrt(sum / n);
+  }
+  return out;
+}
+
+TEST(LegClock, CostsKiNoDriftOnceItIsFound) {
+  const Fault faults[] = {{.drift = 50e-6, .jitter = 0.002},
+                          {.offset = 0.1, .drift = 50e-6, .jitter = 0.002},
+                          {.late = 0.1, .offset = -0.3, .drift = 50e-6, .jitter = 0.002},
+                          {.offset = 0.5, .drift = 50e-6, .jitter = 0.002},
+                          {.offset = 0.5, .jitter = 0.002, .frozen_from = 0},
+                          {.offset = 0.5, .drift = 50e-6, .jitter = 0.002, .frozen_from = 20}};
+  for (const char* name : {"room", "fwd_bwd", "square"}) {
+    const Walk walk(40, name);
+    const Drift right = drift_of(walk, {});
+    std::printf("%-8s true stamps      : %5.1f mm, from 10 s of walking on %5.1f mm\n", name, 1e3 * right.whole, 1e3 * right.walked);
+    for (const Fault& fault : faults) {
+      const Drift found = drift_of(walk, fault);
+      std::printf("%-8s %+.1f s, %.1f s late: %5.1f mm, from 10 s of walking on %5.1f mm\n", name, fault.offset, fault.late,
+                  1e3 * found.whole, 1e3 * found.walked);
+      EXPECT_LT(found.walked, 1.5 * right.walked) << name << ", offset " << fault.offset;
+      EXPECT_LT(found.whole, 0.1) << "the first steps are those of the IMU alone";
+    }
+  }
+}
+
+TEST(DeviceClock, SamplesThatAreReceivedAtOnceAreSeveral) {
+  DeviceClock clock(0.002);
+  const auto ms = [](int n) { return std::chrono::milliseconds(n); };
+  const Time arrived = time_from_ns(1'000'000'000), first = clock.follow(ms(2), arrived);
+  EXPECT_EQ(clock.follow(ms(2), arrived), first) << "the IMU of the same message";
+  EXPECT_NEAR(to_seconds(clock.follow(ms(4), arrived) - first), 0.002, 1.1e-3);
+  EXPECT_NE(clock.follow(ms(4), arrived), first);
 }
 
 TEST(TickCounter, WrapsAround) {
