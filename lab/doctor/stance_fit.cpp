@@ -16,6 +16,7 @@ constexpr std::size_t shortest = 8;         // samples of a stance
 constexpr std::size_t edge = 2;             // samples at either end, where soles roll
 constexpr std::size_t fewest_stances = 24;  // stances
 constexpr double stance_slack = 0.02;       // s
+constexpr double clock_step = 2e-4;         // s, for derivatives
 // m, rad: of the rows. A sole tilts with the load on it by a tenth of a degree, in step with the gait, while its middle stays where it is.
 constexpr double unit_p = 0.003, unit_R = 0.03;
 constexpr double nudge = 1e-3;  // rad
@@ -23,6 +24,9 @@ constexpr double nudge = 1e-3;  // rad
 constexpr double prior_p = 0.01, prior_zero = 0.004, prior_scale = 0.005;  // m, rad, -
 constexpr int passes = 3;
 constexpr Eigen::Index of_p = 3, of_offset = 6, of_scale = 7, of_zeros = 8;
+
+/// By the unknowns: of a sole's place in the world, and of its turn in its own frame.
+using SoleChange = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
 /// The middle of a sole and its turn in the link's frame, and how they change with the joints' zeros.
 struct Sole {
@@ -143,6 +147,38 @@ class Stances {
     }
   }
 
+  /// Of these rows, where they have just been taken.
+  void derivative(const Eigen::VectorXd& x, Derivatives& J) {
+    place_later(x);
+    std::vector<SE3> soles;
+    std::vector<SoleChange> changes;
+    Eigen::Index row = 0;
+    for (const Stance& stance : stances_) {
+      const std::size_t n = stance.end - stance.begin;
+      soles.clear(), changes.clear();
+      for (std::size_t i = stance.begin; i < stance.end; ++i) {
+        soles.push_back(sole_at(x, i, stance.foot).value_or(SE3{}));
+        changes.push_back(change_of(x, i, stance.foot, soles.back()));
+      }
+      // Turns are against the middle sole.
+      const SO3 back = soles[n / 2].R.inverse();
+      const Eigen::Matrix3Xd of_middle = changes[n / 2].bottomRows<3>();
+      SoleChange mean = SoleChange::Zero(6, x.size());
+      const std::size_t from = n / 4, to = n - n / 4;
+      for (std::size_t i = 0; i < n; ++i) {
+        const Eigen::Vector3d turn = (back * soles[i].R).Log();
+        changes[i].bottomRows<3>() =
+            right_jacobian(turn).inverse() * changes[i].bottomRows<3>() - right_jacobian(-turn).inverse() * of_middle;
+        if (i >= from && i < to) mean += changes[i] / static_cast<double>(to - from);
+      }
+      for (const SoleChange& change : changes) {
+        J.middleRows<3>(row) = (change - mean).topRows<3>() / unit_p;
+        J.middleRows<3>(row + 3) = (change - mean).bottomRows<3>() / unit_R;
+        row += 6;
+      }
+    }
+  }
+
   SO3 rotation(const Eigen::VectorXd& x) const { return SO3::Exp(x.head<3>()) * T_LI_.R; }
 
  private:
@@ -196,6 +232,36 @@ class Stances {
     return *T_WI * T_IL_ * in_link;
   }
 
+  // Where the IMU was a little later than place() says.
+  void place_later(const Eigen::VectorXd& x) {
+    const double later = offset_ + std::clamp(x[of_offset] + clock_step, -stance_slack, stance_slack);
+    T_WI_later_.clear();
+    for (const Sample& s : samples_) T_WI_later_.push_back(way_.at(s.t + later, gyro_));
+  }
+
+  // After place() and place_later() with the same values. `T_WF`: sole_at() them.
+  SoleChange change_of(const Eigen::VectorXd& x, std::size_t i, std::size_t f, const SE3& T_WF) const {
+    SoleChange out = SoleChange::Zero(6, x.size());
+    if (!T_WI_[i]) return out;
+    const Sole& sole = samples_[i].sole[f];
+    const auto zeros = x.tail(x.size() - of_zeros);
+    const double scale = 1 + x[of_scale];
+    const Eigen::Matrix3d R_WL = (T_WI_[i]->R * T_IL_.R).matrix(), R_FL = T_WF.R.matrix().transpose() * R_WL;
+    const Eigen::Vector3d c = sole.c + sole.by_c * zeros, from_imu = scale * c - T_IL_.inverse().p;
+    const Eigen::Matrix3d left = right_jacobian(-x.head<3>());
+    out.topLeftCorner<3, 3>() = R_WL * skew(from_imu) * left;
+    out.bottomLeftCorner<3, 3>() = -R_FL * left;
+    out.block<3, 3>(0, of_p) = -R_WL;
+    if (T_WI_later_[i]) {
+      const SE3 moved = *T_WI_later_[i] * T_WI_[i]->inverse() * T_WF;
+      out.col(of_offset) << (moved.p - T_WF.p) / clock_step, (T_WF.R.inverse() * moved.R).Log() / clock_step;
+    }
+    out.col(of_scale).head<3>() = R_WL * c;
+    out.topRightCorner(3, zeros.size()) = scale * R_WL * sole.by_c;
+    out.bottomRightCorner(3, zeros.size()) = right_jacobian(sole.by_R * zeros) * sole.by_R;
+    return out;
+  }
+
   const LidarWay& way_;
   const GyroPath& gyro_;
   SE3 T_LI_;
@@ -203,7 +269,7 @@ class Stances {
   std::vector<std::size_t> joints_;
   std::vector<Sample> samples_;
   SE3 T_IL_;                              // with the values of place()
-  std::vector<std::optional<SE3>> T_WI_;  // of the samples, with this clock:
+  std::vector<std::optional<SE3>> T_WI_later_, T_WI_;  // of the samples, the latter with this clock:
   std::optional<double> placed_by_;
   std::vector<Stance> stances_;
 };
@@ -221,14 +287,15 @@ StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesi
   prior[of_offset] = INFINITY;
   prior[of_scale] = prior_scale;
   step.setConstant(1e-4);
-  step[of_offset] = 2e-4;
+  step[of_offset] = clock_step;
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(n);
   Fit fit;
   for (int k = 0; k < passes; ++k) {
     stances.find(x, k == 0);
     if (stances.stances() < fewest_stances) return out;
     const auto rows = [&stances](const Eigen::VectorXd& at, Residuals& r) { stances.rows(at, r); };
-    fit = robust_fit(rows, none, prior / std::sqrt(stances.repeated()), step, 8);
+    const auto derivative = [&stances](const Eigen::VectorXd& at, Derivatives& J) { stances.derivative(at, J); };
+    fit = robust_fit(rows, none, prior / std::sqrt(stances.repeated()), step, 8, derivative);
     if (!fit.good) return out;
     x = fit.x;
   }
