@@ -46,6 +46,25 @@ std::vector<SweepPose> mirrored(std::vector<SweepPose> way, const Eigen::Matrix3
 
 }  // namespace
 
+// Deskewed by the gyro as described, if they turn as it does then; else as rigid ones, so that neither mount nor clock can spoil it.
+void Examination::register_sweeps() {
+  if (recorded_.sweeps.empty()) return;
+  const SO3 described = robot_.lidar.T_imu_lidar.R;
+  constexpr double least_explained = 0.8;
+  if (earlier_.origin != recorded_.origin) earlier_ = {earlier_.point_times_are_good, recorded_.origin, {}, {}};
+  const GyroPath path = gyro();
+  earlier_.described.extend(recorded_.sweeps, {&path, described});
+  first_ = earlier_.described.way();
+  lidar_turns_ = turns_of(first_);
+  lidar_ = agreement(lidar_turns_, described, least_explained);
+  deskewed_ = lidar_.known && lidar_.agrees;
+  const bool turned = lidar_.explained != 0;
+  if (deskewed_ || !turned) return;
+  first_ = scan_odometry(recorded_.sweeps, {});
+  lidar_turns_ = turns_of(first_);
+  lidar_ = agreement(lidar_turns_, described, least_explained);
+}
+
 void Examination::examine_lidar() {
   const std::size_t clouds = recorded_.stamps[static_cast<std::size_t>(Sensor::lidar)].count;
   if (clouds >= 30 && recorded_.sweeps.size() < clouds / 10) {
@@ -94,11 +113,9 @@ void Examination::examine_point_times() {
     return;
   }
   const GyroPath path = gyro();
-  const SO3 start = SO3::nearest(lidar_.error * robot_.lidar.T_imu_lidar.R.matrix());
-  const MountFit first = fit_mount(lidar_turns_, path, start, lidar_.offset);
-  Deskew deskew{&path, first.fit.good ? first.R : start, first.fit.good ? first.offset : lidar_.offset, false};
-  way_ = scan_odometry(recorded_.sweeps, deskew);
-  if (!point_times_are_good_ && point_times_run_backwards(deskew)) {
+  Deskew deskew{&path, robot_.lidar.T_imu_lidar.R};
+  deskew_first(deskew);
+  if (!earlier_.point_times_are_good && point_times_run_backwards(deskew)) {
     deskew.reversed = true;
     way_ = scan_odometry(recorded_.sweeps, deskew);
   }
@@ -121,6 +138,20 @@ void Examination::examine_point_times() {
                        fit ? fit->g_W : Eigen::Vector3d::Zero(), fit ? fit->ba : Eigen::Vector3d::Zero());
   deskew.way = swung.empty() ? nullptr : &swung;
   deskew.p_IL = T_IL.p;
+  earlier_.swung.extend(recorded_.sweeps, deskew);
+  way_ = earlier_.swung.way();
+}
+
+// By the gyro under the mount and the clock that rigid sweeps tell, unless that was done with the described ones.
+void Examination::deskew_first(Deskew& deskew) {
+  if (deskewed_) {
+    way_ = first_;
+    return;
+  }
+  const SO3 start = SO3::nearest(lidar_.error * deskew.R_IL.matrix());
+  const MountFit fit = fit_mount(lidar_turns_, *deskew.gyro, start, lidar_.offset);
+  deskew.R_IL = fit.fit.good ? fit.R : start;
+  deskew.offset = fit.fit.good ? fit.offset : lidar_.offset;
   way_ = scan_odometry(recorded_.sweeps, deskew);
 }
 
@@ -141,20 +172,18 @@ bool Examination::point_times_run_backwards(Deskew deskew) {
     best = i;
   }
   constexpr double clearly = 0.9;
-  const auto thickness = [&](const std::vector<SweepPose>& way) {
-    return mean_thickness(std::span(way).subspan(best, std::min(stretch, way.size() - best)));
-  };
+  const OdometryRange range{best, best + stretch};
+  const double rigid = mean_thickness(scan_odometry(recorded_.sweeps, {}, range));
   // Times that help would not help the other way round.
-  if (const double with = thickness(way_), without = thickness(rigid_); with < clearly * without) {
+  if (const double with = mean_thickness(std::span(way_).subspan(best, std::min(stretch, way_.size() - best))); with < clearly * rigid) {
+    earlier_.point_times_are_good = true;
     check(Sensor::lidar, "point times", Check::Verdict::good,
-          fmt::format("surfaces are {:.1f} mm thick with the points' times, {:.1f} mm without", 1e3 * with, 1e3 * without));
+          fmt::format("surfaces are {:.1f} mm thick with the points' times, {:.1f} mm without", 1e3 * with, 1e3 * rigid));
     return false;
   }
-  const OdometryRange range{best, best + stretch};
   const double forward = mean_thickness(scan_odometry(recorded_.sweeps, deskew, range));
   deskew.reversed = true;
   const double backward = mean_thickness(scan_odometry(recorded_.sweeps, deskew, range));
-  const double rigid = mean_thickness(scan_odometry(recorded_.sweeps, {}, range));
   const std::string evidence =
       fmt::format("surfaces are {:.1f} mm thick with the points' times, {:.1f} mm with reversed ones, {:.1f} mm without", 1e3 * forward,
                   1e3 * backward, 1e3 * rigid);
@@ -170,13 +199,14 @@ bool Examination::point_times_run_backwards(Deskew deskew) {
           true});
     return true;
   }
-  check(Sensor::lidar, "point times", forward <= rigid / clearly ? Check::Verdict::good : Check::Verdict::note, evidence);
+  earlier_.point_times_are_good = forward <= rigid / clearly;
+  check(Sensor::lidar, "point times", earlier_.point_times_are_good ? Check::Verdict::good : Check::Verdict::note, evidence);
   return false;
 }
 
 MountFit Examination::examine_lidar_rotation() {
   const std::vector<Turn> turns = way_.empty() ? lidar_turns_ : turns_of(way_);
-  if (way_.empty()) way_ = rigid_;
+  if (way_.empty()) way_ = first_;
   const SO3 described = robot_.lidar.T_imu_lidar.R;
   const SO3 start = SO3::nearest(lidar_.error * described.matrix());
   const GyroPath path = gyro();

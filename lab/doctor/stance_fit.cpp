@@ -19,7 +19,7 @@ constexpr double stance_slack = 0.02;       // s
 constexpr double clock_step = 2e-4;         // s, for derivatives
 // m, rad: of the rows. A sole tilts with the load on it by a tenth of a degree, in step with the gait, while its middle stays where it is.
 constexpr double unit_p = 0.003, unit_R = 0.03;
-constexpr double nudge = 1e-3;  // rad
+constexpr double nudge = 1e-4;  // rad
 // What a careful description leaves: of positions, zeros of encoders and lengths.
 constexpr double prior_p = 0.01, prior_zero = 0.004, prior_scale = 0.005;  // m, rad, -
 constexpr int passes = 3;
@@ -193,20 +193,18 @@ class Stances {
   void differentiate(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, Eigen::Index j) {
     LegHypothesis h = hypothesis != nullptr ? *hypothesis : LegHypothesis{};
     const std::size_t joint = joints_[static_cast<std::size_t>(j)];
-    for (const double side : {1.0, -1.0}) {
-      h.position = [base = hypothesis != nullptr ? hypothesis->position : nullptr, joint, side](std::size_t i, double& q) {
-        if (base) base(i, q);
-        if (i == joint) q += side * nudge;
-      };
-      std::size_t k = 0;
-      for (const LegPose& pose : legs.path(robot, &h, sample_period, nullptr)) {
-        while (k < samples_.size() && samples_[k].t < pose.t) ++k;
-        if (k == samples_.size() || samples_[k].t != pose.t) continue;
-        for (std::size_t f = 0; f < 2; ++f) {
-          Sole& sole = samples_[k].sole[f];
-          sole.by_c.col(j) += side * middle_of(pose.foot[f]) / (2 * nudge);
-          sole.by_R.col(j) += side * (sole.R.inverse() * pose.foot[f].R_IF).Log() / (2 * nudge);
-        }
+    h.position = [base = hypothesis != nullptr ? hypothesis->position : nullptr, joint](std::size_t i, double& q) {
+      if (base) base(i, q);
+      if (i == joint) q += nudge;
+    };
+    std::size_t k = 0;
+    for (const LegPose& pose : legs.path(robot, &h, sample_period, nullptr)) {
+      while (k < samples_.size() && samples_[k].t < pose.t) ++k;
+      if (k == samples_.size() || samples_[k].t != pose.t) continue;
+      for (std::size_t f = 0; f < 2; ++f) {
+        Sole& sole = samples_[k].sole[f];
+        sole.by_c.col(j) = (middle_of(pose.foot[f]) - sole.c) / nudge;
+        sole.by_R.col(j) = (sole.R.inverse() * pose.foot[f].R_IF).Log() / nudge;
       }
     }
   }
@@ -268,7 +266,7 @@ class Stances {
   double offset_;
   std::vector<std::size_t> joints_;
   std::vector<Sample> samples_;
-  SE3 T_IL_;                              // with the values of place()
+  SE3 T_IL_;                                           // with the values of place()
   std::vector<std::optional<SE3>> T_WI_later_, T_WI_;  // of the samples, the latter with this clock:
   std::optional<double> placed_by_;
   std::vector<Stance> stances_;
