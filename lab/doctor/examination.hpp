@@ -62,7 +62,6 @@ class Examination {
   // imu_examination.cpp
   void examine_rates();
   void examine_acceleration_unit();
-  void register_sweeps();
   void agree_with_gyro();
   void settle_axes();
   void accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence);
@@ -71,11 +70,13 @@ class Examination {
   Eigen::Vector3d up_by_legs() const;
   void examine_upright();
   void blame_imu_for_all();
-  // lidar_examination.cpp
-  void examine_lidar();
+  // sweep_examination.cpp
+  void register_sweeps();
   void examine_point_times();
   void deskew_first(Deskew& deskew);
   bool point_times_run_backwards(Deskew deskew);
+  // lidar_examination.cpp
+  void examine_lidar();
   /// Of rotation, clock and gyro bias at once.
   MountFit examine_lidar_rotation();
   void examine_lidar_clock(const MountFit& fit);
@@ -159,6 +160,9 @@ class Examination {
   Diagnosis diagnosis_;
   std::vector<Refinement> refinements_;
 };
+
+/// From each sweep to the next, where both are registered.
+std::vector<Turn> turns_of(const std::vector<SweepPose>& way);
 
 std::string rotation_text(const SO3& R);  // as YAML, row by row
 std::string vector_text(const Eigen::Vector3d& p);
