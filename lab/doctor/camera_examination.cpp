@@ -113,7 +113,7 @@ void Examination::examine_camera() {
     m.height = recorded_.image_height;
   }
   const GyroPath path = gyro();
-  const LidarWay way = lidar_way();
+  const LidarWay& way = lidar_way();
   const CameraTracks tracks(recorded_.tracks, path, way.empty() ? nullptr : &way);
   if (tracks.pairs() < 20 || tracks.turning() < 0.05) {
     check(Sensor::camera, "mount, intrinsics, clock", Check::Verdict::unknown,

@@ -37,13 +37,17 @@ bool is_mendable(const Finding& finding) {
 }
 
 // Most descriptions are right, which a part of the points shows; what seems wrong, or does not show, is judged by all of them.
-Diagnosis diagnosis_of(const Recorded& recorded, const Robot& robot, bool point_times_are_good) {
+// `earlier`: of these, when all is right.
+Diagnosis diagnosis_of(const Recorded& recorded, const Robot& robot, Earlier& earlier) {
   constexpr std::size_t part = 3;
   const Recorded few = thinned(recorded, part);
-  const Diagnosis first = Examination(few, robot, point_times_are_good).run();
+  Examination by_few(few, robot, std::move(earlier));
+  const Diagnosis first = by_few.run();
+  earlier = by_few.for_later();
   const auto unclear = [](const Check& c) { return c.sensor == Sensor::lidar && c.verdict == Check::Verdict::unknown; };
   if (first.findings.empty() && std::ranges::none_of(first.checks, unclear)) return first;
-  return Examination(recorded, robot, point_times_are_good).run();
+  earlier = {earlier.point_times_are_good, 0, {}, {}};
+  return Examination(recorded, robot, {earlier.point_times_are_good, 0, {}, {}}).run();
 }
 
 }  // namespace
@@ -105,12 +109,10 @@ void DescriptionWatch::judge(Time t) {
   collect();
   if (over_) return;
   if (first_ || moved()) {
-    auto work = [robot = robot_, recorder = recorder_, t, good = point_times_are_good_]() mutable {
+    auto work = [robot = robot_, recorder = recorder_, t, earlier = std::move(earlier_)]() mutable {
       const Recorded recorded = recorder.finish();
-      const Diagnosis diagnosis = diagnosis_of(recorded, robot, good);
-      const auto times = std::ranges::find(diagnosis.checks, "point times", &Check::what);
-      return Verdict{diagnosis.findings, diagnosis.settled,
-                     good || (times != diagnosis.checks.end() && times->verdict == Check::Verdict::good), t};
+      const Diagnosis diagnosis = diagnosis_of(recorded, robot, earlier);
+      return Verdict{diagnosis.findings, diagnosis.settled, std::move(earlier), t};
     };
     future_ = std::async(judging_ == Judging::here ? std::launch::deferred : std::launch::async, std::move(work));
     if (judging_ == Judging::here) collect();
@@ -123,9 +125,9 @@ void DescriptionWatch::judge(Time t) {
 
 void DescriptionWatch::collect() {
   if (!future_.valid()) return;
-  const Verdict verdict = future_.get();
+  Verdict verdict = future_.get();
   over_ = verdict.known || windows_ >= most_windows;
-  point_times_are_good_ = verdict.point_times_are_good;
+  earlier_ = std::move(verdict.earlier);
   for (const Finding& finding : verdict.findings) {
     const auto same = [&finding](const WrongDescription& w) { return w.finding.cause == finding.cause; };
     if (std::ranges::none_of(found_, same)) found_.push_back(as_wrong(finding, verdict.t, to_seconds(verdict.t - *origin_)));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kilvo/sensors/robot.hpp"
+#include "lab/doctor/examination.hpp"
 #include "lab/doctor/finding.hpp"
 #include "lab/doctor/recorded.hpp"
 
@@ -46,7 +47,7 @@ class DescriptionWatch {
   struct Verdict {
     std::vector<Finding> findings;
     bool known = false;  // nothing that more data could show was left open
-    bool point_times_are_good = false;
+    Earlier earlier;
     Time t{};
   };
   void begin(Time t);
@@ -64,8 +65,8 @@ class DescriptionWatch {
   bool over_ = false;    // all is judged
   bool first_ = true;    // window: judged even when the robot stands, for units and rates
   int windows_ = 0;      // in which the robot moved
-  bool point_times_are_good_ = false;
-  double turned_ = 0;  // rad, by the gyro in this window
+  Earlier earlier_;      // what the judgement before has shown
+  double turned_ = 0;    // rad, by the gyro in this window
   std::optional<Time> last_imu_;
   std::future<Verdict> future_;
   std::vector<WrongDescription> found_;

@@ -111,7 +111,7 @@ std::vector<InertialSample> Examination::mended_imu() const {
   return out;
 }
 
-LidarWay Examination::lidar_way() const {
+LidarWay Examination::smoothed_way() const {
   const std::vector<SweepPose> none;
   const TranslationFit fit = translation_.value_or(TranslationFit{});
   SE3 T_IL = robot_.lidar.T_imu_lidar;
@@ -156,10 +156,11 @@ Diagnosis Examination::run() {
     return diagnosis_;
   }
   examine_acceleration_unit();
-  if (!recorded_.sweeps.empty()) rigid_ = scan_odometry(recorded_.sweeps, {});
+  register_sweeps();
   agree_with_gyro();
   settle_axes();
   examine_lidar();
+  lidar_way_ = smoothed_way();
   examine_legs();
   examine_upright();
   examine_camera();

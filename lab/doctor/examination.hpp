@@ -36,11 +36,17 @@ struct SenseAgreement {
   double weakest = 0;                                   // rad/s, rms of the turning about the least turned axis
 };
 
+/// What a recording has shown that is continued later: it need not be found again.
+struct Earlier {
+  bool point_times_are_good = false;
+  std::int64_t origin = 0;        // ns, of the recording, which tells it from others
+  ScanOdometry described, swung;  // the LiDAR's way with the description, and with all that the data said
+};
+
 class Examination {
  public:
-  /// `point_times_are_good`: which takes as long to see as most else; seen before.
-  Examination(const Recorded& recorded, const Robot& robot, bool point_times_are_good = false)
-      : recorded_(recorded), robot_(robot), original_(robot), point_times_are_good_(point_times_are_good) {}
+  Examination(const Recorded& recorded, const Robot& robot, Earlier earlier = {})
+      : recorded_(recorded), robot_(robot), original_(robot), earlier_(std::move(earlier)) {}
 
   /// All checks, in their order.
   Diagnosis run();
@@ -49,6 +55,8 @@ class Examination {
   const Robot& robot() const { return robot_; }
   /// After run(): what the recording says about mounts, focal length and clocks, with its standard deviations.
   const std::vector<Refinement>& refinements() const { return refinements_; }
+  /// After run() without a finding: for an examination of more of the same recording.
+  Earlier for_later() { return std::move(earlier_); }
 
  private:
   // imu_examination.cpp
@@ -62,10 +70,13 @@ class Examination {
   Eigen::Vector3d up_by_legs() const;
   void examine_upright();
   void blame_imu_for_all();
+  // sweep_examination.cpp
+  void register_sweeps();
+  void examine_point_times();
+  void deskew_first(Deskew& deskew);
+  bool point_times_run_backwards(Deskew deskew);
   // lidar_examination.cpp
   void examine_lidar();
-  void examine_point_times();
-  bool point_times_run_backwards(Deskew deskew);
   /// Of rotation, clock and gyro bias at once.
   MountFit examine_lidar_rotation();
   void examine_lidar_clock(const MountFit& fit);
@@ -115,8 +126,9 @@ class Examination {
   GyroPath gyro() const { return {recorded_.imu, gyro_axes_, gyro_bias_}; }
   SenseAgreement agreement(const std::vector<Turn>& turns, const SO3& mount, double least_explained) const;
   std::vector<InertialSample> mended_imu() const;
-  /// Without places where the LiDAR's way is not known.
-  LidarWay lidar_way() const;
+  /// After examine_lidar(). Without places where the LiDAR's way is not known.
+  const LidarWay& lidar_way() const { return *lidar_way_; }
+  LidarWay smoothed_way() const;
   SE3 T_link_imu() const { return robot_.imu.T_link_imu; }
   void check(Sensor sensor, const std::string& what, Check::Verdict verdict, const std::string& detail);
   void find(Finding finding);
@@ -134,18 +146,23 @@ class Examination {
   Eigen::Matrix3d gyro_axes_ = Eigen::Matrix3d::Identity();  // take what was written to rad/s and m/s^2 in the IMU frame
   Eigen::Matrix3d accel_axes_ = Eigen::Matrix3d::Identity();
   Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();  // rad/s, by the LiDAR
-  std::vector<SweepPose> rigid_, way_;                   // the LiDAR's way without and with the gyro's help
+  Earlier earlier_;
+  bool deskewed_ = false;               // by the gyro as described, as which the sweeps turn
+  std::vector<SweepPose> first_, way_;  // the LiDAR's way, so or of rigid sweeps, and with all that the data say
+  std::optional<LidarWay> lidar_way_;
   std::vector<Turn> lidar_turns_, leg_turns_;
   SenseAgreement lidar_, legs_;
   std::optional<LegHypothesis> leg_mend_;
-  std::optional<SO3> leg_start_;  // mount of the IMU on its link, far from the described one, from which that is looked for
-  bool point_times_are_good_;
+  std::optional<SO3> leg_start_;              // mount of the IMU on its link, far from the described one, from which that is looked for
   double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock
   std::optional<TranslationFit> translation_;
   std::optional<StanceFit> stances_;
   Diagnosis diagnosis_;
   std::vector<Refinement> refinements_;
 };
+
+/// From each sweep to the next, where both are registered.
+std::vector<Turn> turns_of(const std::vector<SweepPose>& way);
 
 std::string rotation_text(const SO3& R);  // as YAML, row by row
 std::string vector_text(const Eigen::Vector3d& p);

@@ -246,5 +246,24 @@ TEST(Doctor, WhoStandsStillIsNotJudged) {
   EXPECT_TRUE(Examination(recorded, robot).run().unknown());
 }
 
+// What is judged after 9 s is judged again after 14 s.
+TEST(ScanOdometry, ContinuesTheWayThatItHas) {
+  const auto expect_equal = [](const std::vector<SweepPose>& a, const std::vector<SweepPose>& b) {
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      EXPECT_EQ(a[i].T_WL.p, b[i].T_WL.p) << i;
+      EXPECT_EQ(a[i].T_WL.R.matrix(), b[i].T_WL.R.matrix()) << i;
+    }
+  };
+  const std::vector<Sweep> all(walked().recorded.sweeps.begin() + 30, walked().recorded.sweeps.begin() + 60);
+  const std::vector<Sweep> some(all.begin(), all.begin() + 20), others(all.begin() + 1, all.end());
+  ScanOdometry odometry;
+  odometry.extend(some, {});
+  odometry.extend(all, {});
+  expect_equal(odometry.way(), scan_odometry(all, {}));
+  odometry.extend(others, {});
+  expect_equal(odometry.way(), scan_odometry(others, {}));
+}
+
 }  // namespace
 }  // namespace kilvo::lab

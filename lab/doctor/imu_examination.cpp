@@ -123,12 +123,6 @@ void Examination::examine_acceleration_unit() {
 }
 
 void Examination::agree_with_gyro() {
-  for (std::size_t i = 1; i < rigid_.size(); ++i) {
-    const SweepPose &a = rigid_[i - 1], &b = rigid_[i];
-    if (a.good && b.good && b.t - a.t < 0.6 && b.t > a.t)
-      lidar_turns_.push_back({a.t, b.t, {(a.T_WL.R.inverse() * b.T_WL.R).Log(), Eigen::Vector3d::Zero()}, 1});
-  }
-  lidar_ = agreement(lidar_turns_, robot_.lidar.T_imu_lidar.R, 0.8);
   if (lidar_.known && is_far_from_one(lidar_.scale) && is_far_throughout(lidar_turns_, gyro(), lidar_.offset)) {
     const bool deg = std::abs(lidar_.scale / per_degree - 1) < 0.15;
     const double factor = deg ? per_degree : lidar_.scale;
@@ -210,7 +204,7 @@ void Examination::settle_axes() {
   const Eigen::Matrix3d before = gyro_axes_;
   gyro_axes_ = G * before;
   const SO3 R_IL = SO3::nearest(G * lidar_.error * robot_.lidar.T_imu_lidar.R.matrix());
-  const TranslationRows rows(rigid_, recorded_.imu, gyro(), R_IL, lidar_.offset);
+  const TranslationRows rows(first_, recorded_.imu, gyro(), R_IL, lidar_.offset);
   gyro_axes_ = before;
   Eigen::Matrix3d A = G;
   double rms = 0;

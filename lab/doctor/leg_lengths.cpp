@@ -148,7 +148,7 @@ Examination::LegWay Examination::measure_leg_way(const LegHypothesis* hypothesis
   const GyroPath path = gyro();
   const Eigen::Vector3d up_W = -translation_->g_W.normalized();
   const SE3 T_link_imu = robot_.imu.T_link_imu, T_link_lidar = T_link_imu * robot_.lidar.T_imu_lidar;
-  const LidarWay lidar = lidar_way();
+  const LidarWay& lidar = lidar_way();
   WayOfLegs way(up_W, T_link_lidar.p);
   for (const LegPose& pose : legs_under(hypothesis)) {
     const double t = pose.t + leg_offset_;

@@ -37,7 +37,7 @@ void Examination::examine_leg_rotation() {
   // What soles that roll and links that bend shift both by shows in what is not explained.
   const double unexplained = std::max(0.0, 1 - fit.explained);
   double method = 0.2 + 10 * unexplained, clock_method = 0.001 + 0.04 * unexplained;  // degrees, s
-  const LidarWay way = lidar_way();
+  const LidarWay& way = lidar_way();
   Robot start = robot_;
   const double far = degrees((fit.R * described.inverse()).Log().norm());
   constexpr double near = 15;  // degrees

@@ -18,7 +18,7 @@ constexpr double clearly = 1.3, least_standing = 2;
 // The clock of the legs, or a mount of the IMU about the vertical, under which the feet stand as they do under no other description
 // of the legs: from there the fit of the stances finds both. The turning alone does not tell them on soles that roll.
 bool Examination::find_leg_start() {
-  const LidarWay way = lidar_way();
+  const LidarWay& way = lidar_way();
   if (way.empty() || (legs_.known && legs_.agrees)) return false;
   const GyroPath path = gyro();
   const LegHypothesis* mend = leg_mend_ ? &*leg_mend_ : nullptr;
@@ -49,7 +49,7 @@ std::vector<SO3> Examination::upright_mounts() const {
 
 // Whatever turns as the gyro does may still not stand: joints of parallel axes exchanged, legs exchanged, soles on another link.
 bool Examination::try_standing_hypotheses(double longer_than) {
-  const LidarWay way = lidar_way();
+  const LidarWay& way = lidar_way();
   if (way.empty()) return false;
   const GyroPath path = gyro();
   const auto stands = [&](const LegHypothesis* h) {
@@ -99,7 +99,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
 
 // On soft ground soles turn under the robot, and their turning tells little; where they stand still tells.
 bool Examination::feet_stand() const {
-  const LidarWay way = lidar_way();
+  const LidarWay& way = lidar_way();
   if (way.empty()) return false;
   constexpr double still = 0.002, near = 0.09;  // m, rad
   Robot start = robot_;

@@ -1,8 +1,7 @@
-// The LiDAR: the times of its points, the rotation and the position of its mount, its clock.
+// The LiDAR: the rotation of its mount, its clock.
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
-#include <span>
 
 #include "lab/doctor/examination.hpp"
 
@@ -13,27 +12,6 @@ namespace {
 constexpr double lidar_rotation_tolerance = 0.7;  // degrees
 constexpr double worth_a_note = 0.08;             // degrees
 constexpr double lidar_clock_tolerance = 0.0035;  // s
-constexpr double believable = 0.2;                // m/s, that the acceleration and the way may be apart by
-
-double mean_thickness(std::span<const SweepPose> way) {
-  double sum = 0, n = 0;
-  for (const SweepPose& p : way) {
-    if (!p.good || p.thickness == 0) continue;
-    sum += p.thickness;
-    n += 1;
-  }
-  return n > 0 ? sum / n : INFINITY;
-}
-
-std::vector<Turn> turns_of(const std::vector<SweepPose>& way) {
-  std::vector<Turn> out;
-  for (std::size_t i = 1; i < way.size(); ++i) {
-    const SweepPose &a = way[i - 1], &b = way[i];
-    if (a.good && b.good && b.t - a.t < 0.6 && b.t > a.t)
-      out.push_back({a.t, b.t, {(a.T_WL.R.inverse() * b.T_WL.R).Log(), Eigen::Vector3d::Zero()}, 1});
-  }
-  return out;
-}
 
 // The same way as seen by a LiDAR whose points are mirrored.
 std::vector<SweepPose> mirrored(std::vector<SweepPose> way, const Eigen::Matrix3d& M) {
@@ -77,106 +55,9 @@ void Examination::examine_lidar() {
   examine_lidar_position();
 }
 
-// Deskewed with the right times the surroundings are sharpest.
-void Examination::examine_point_times() {
-  double span = 0;
-  for (const Sweep& s : recorded_.sweeps) span = std::max(span, s.end - s.begin);
-  if (span < 1e-4) {
-    find({Sensor::lidar,
-          "point_times_absent",
-          "all points of a sweep have the same time",
-          fmt::format("the longest sweep lasts {:.3f} ms by its points", 1e3 * span),
-          "the driver must publish point times (or kilvo run --no-deskew for a LiDAR that measures at once)",
-          span,
-          "s",
-          {},
-          true});
-    return;
-  }
-  const GyroPath path = gyro();
-  const SO3 start = SO3::nearest(lidar_.error * robot_.lidar.T_imu_lidar.R.matrix());
-  const MountFit first = fit_mount(lidar_turns_, path, start, lidar_.offset);
-  Deskew deskew{&path, first.fit.good ? first.R : start, first.fit.good ? first.offset : lidar_.offset, false};
-  way_ = scan_odometry(recorded_.sweeps, deskew);
-  if (!point_times_are_good_ && point_times_run_backwards(deskew)) {
-    deskew.reversed = true;
-    way_ = scan_odometry(recorded_.sweeps, deskew);
-  }
-  // Once more with the mount and the clock that follow: sweeps taken as rigid shift both a little.
-  const MountFit again = fit_mount(turns_of(way_), path, deskew.R_IL, deskew.offset);
-  if (!again.fit.good) return;
-  gyro_bias_ = again.bias;
-  const GyroPath better = gyro();
-  deskew.gyro = &better;
-  deskew.R_IL = again.R;
-  deskew.offset = again.offset;
-  // What the acceleration says of the velocity within a sweep; with a wrong description it fits nothing, and is left out.
-  const auto fit = TranslationRows(way_, recorded_.imu, better, again.R, again.offset).fit(accel_axes_);
-  // A place that is hardly known would make the way that it is measured by.
-  SE3 T_IL{again.R, robot_.lidar.T_imu_lidar.p};
-  for (int i = 0; fit && i < 3; ++i) {
-    if (std::abs(fit->r[i] - T_IL.p[i]) > sure * fit->sigma_r(i)) T_IL.p[i] = fit->r[i];
-  }
-  const LidarWay swung(fit && fit->rms < believable ? way_ : std::vector<SweepPose>{}, T_IL, again.offset, mended_imu(), better,
-                       fit ? fit->g_W : Eigen::Vector3d::Zero(), fit ? fit->ba : Eigen::Vector3d::Zero());
-  deskew.way = swung.empty() ? nullptr : &swung;
-  deskew.p_IL = T_IL.p;
-  way_ = scan_odometry(recorded_.sweeps, deskew);
-}
-
-// With the times as they come, or reversed, or without: which leaves the thinnest surfaces.
-bool Examination::point_times_run_backwards(Deskew deskew) {
-  // The stretch that turns most.
-  std::size_t best = 0;
-  double most = -1;
-  constexpr std::size_t stretch = 70;
-  std::vector<double> sums(recorded_.sweeps.size() + 1, 0);
-  for (std::size_t i = 0; i < recorded_.sweeps.size(); ++i) {
-    const Sweep& s = recorded_.sweeps[i];
-    sums[i + 1] = sums[i] + (deskew.gyro->covers(s.begin, s.end) && s.end > s.begin ? deskew.gyro->rate(s.begin, s.end).norm() : 0);
-  }
-  for (std::size_t i = 0; i + stretch < sums.size(); ++i) {
-    if (sums[i + stretch] - sums[i] <= most) continue;
-    most = sums[i + stretch] - sums[i];
-    best = i;
-  }
-  constexpr double clearly = 0.9;
-  const auto thickness = [&](const std::vector<SweepPose>& way) {
-    return mean_thickness(std::span(way).subspan(best, std::min(stretch, way.size() - best)));
-  };
-  // Times that help would not help the other way round.
-  if (const double with = thickness(way_), without = thickness(rigid_); with < clearly * without) {
-    check(Sensor::lidar, "point times", Check::Verdict::good,
-          fmt::format("surfaces are {:.1f} mm thick with the points' times, {:.1f} mm without", 1e3 * with, 1e3 * without));
-    return false;
-  }
-  const OdometryRange range{best, best + stretch};
-  const double forward = mean_thickness(scan_odometry(recorded_.sweeps, deskew, range));
-  deskew.reversed = true;
-  const double backward = mean_thickness(scan_odometry(recorded_.sweeps, deskew, range));
-  const double rigid = mean_thickness(scan_odometry(recorded_.sweeps, {}, range));
-  const std::string evidence =
-      fmt::format("surfaces are {:.1f} mm thick with the points' times, {:.1f} mm with reversed ones, {:.1f} mm without", 1e3 * forward,
-                  1e3 * backward, 1e3 * rigid);
-  if (backward < clearly * forward && backward < rigid) {
-    find({Sensor::lidar,
-          "point_times_reversed",
-          "the points' times run backwards within a sweep",
-          evidence,
-          "the driver must publish the time of each point from the beginning of the sweep",
-          0,
-          "",
-          {},
-          true});
-    return true;
-  }
-  check(Sensor::lidar, "point times", forward <= rigid / clearly ? Check::Verdict::good : Check::Verdict::note, evidence);
-  return false;
-}
-
 MountFit Examination::examine_lidar_rotation() {
   const std::vector<Turn> turns = way_.empty() ? lidar_turns_ : turns_of(way_);
-  if (way_.empty()) way_ = rigid_;
+  if (way_.empty()) way_ = first_;
   const SO3 described = robot_.lidar.T_imu_lidar.R;
   const SO3 start = SO3::nearest(lidar_.error * described.matrix());
   const GyroPath path = gyro();

@@ -19,26 +19,42 @@ double squared_length(const Residuals& r, std::size_t group) {
 struct Normal {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
-  explicit Normal(Eigen::Index n) : H(Eigen::MatrixXd::Zero(n, n)), g(Eigen::VectorXd::Zero(n)) {}
 };
 
 // By block.
-std::vector<Normal> sum_up(const Residuals& at, const std::vector<Residuals>& moved, const Eigen::VectorXd& step, double scale) {
-  const auto n = step.size();
+std::vector<Normal> sum_up(const Residuals& at, const Derivatives& J, double scale) {
   const auto width = static_cast<std::size_t>(at.width);
-  std::vector<Normal> out;
-  Eigen::VectorXd J(n);
+  Eigen::VectorXd weights(J.rows());
   for (std::size_t k = 0; k < at.groups(); ++k) {
-    if (k == 0 || at.block[k] != at.block[k - 1]) out.emplace_back(n);
     const double weight = 1 / (1 + squared_length(at, k) / (static_cast<double>(width) * 4 * scale * scale));
-    for (std::size_t i = k * width; i < (k + 1) * width; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) J[j] = (moved[static_cast<std::size_t>(j)].r[i] - at.r[i]) / step[j];
-      out.back().H.selfadjointView<Eigen::Lower>().rankUpdate(J, weight);
-      out.back().g += weight * at.r[i] * J;
-    }
+    weights.segment(static_cast<Eigen::Index>(k * width), at.width).setConstant(weight);
   }
-  for (Normal& block : out) block.H.triangularView<Eigen::StrictlyUpper>() = block.H.transpose();
+  const Eigen::Map<const Eigen::VectorXd> r(at.r.data(), J.rows());
+  std::vector<Normal> out;
+  Derivatives weighted;
+  for (std::size_t k = 0, next = 0; k < at.groups(); k = next) {
+    while (next < at.groups() && at.block[next] == at.block[k]) ++next;
+    const auto first = static_cast<Eigen::Index>(k * width), rows = static_cast<Eigen::Index>((next - k) * width);
+    weighted = weights.segment(first, rows).asDiagonal() * J.middleRows(first, rows);
+    out.push_back({weighted.transpose() * J.middleRows(first, rows), weighted.transpose() * r.segment(first, rows)});
+  }
   return out;
+}
+
+// By differences; false when the rows are not the same there.
+bool differentiate(const ResidualFunction& residuals, const Eigen::VectorXd& x, const Residuals& at, const Eigen::VectorXd& step,
+                   Derivatives& J) {
+  const Eigen::Map<const Eigen::VectorXd> r(at.r.data(), J.rows());
+  Residuals there;
+  for (Eigen::Index j = 0; j < x.size(); ++j) {
+    Eigen::VectorXd moved = x;
+    moved[j] += step[j];
+    there.clear();
+    residuals(moved, there);
+    if (there.groups() != at.groups()) return false;
+    J.col(j) = (Eigen::Map<const Eigen::VectorXd>(there.r.data(), J.rows()) - r) / step[j];
+  }
+  return true;
 }
 
 }  // namespace
@@ -63,27 +79,25 @@ double cost_of(const Residuals& r, double scale) {
 }
 
 Fit robust_fit(const ResidualFunction& residuals, const Eigen::VectorXd& start, const Eigen::VectorXd& prior_sigma,
-               const Eigen::VectorXd& step, int iterations) {
+               const Eigen::VectorXd& step, int iterations, const DerivativeFunction& derivative) {
   Fit out;
   out.x = start;
   const auto n = start.size();
   const Eigen::VectorXd prior = prior_sigma.array().square().inverse();
   Residuals at;
-  std::vector<Residuals> moved(static_cast<std::size_t>(n));
+  Derivatives J;
   for (int k = 0; k <= iterations; ++k) {
     at.clear();
     residuals(out.x, at);
     if (at.groups() < static_cast<std::size_t>(5 * n)) return out;
     out.scale = scale_of(at);
-    for (Eigen::Index j = 0; j < n; ++j) {
-      Eigen::VectorXd x = out.x;
-      x[j] += step[j];
-      Residuals& there = moved[static_cast<std::size_t>(j)];
-      there.clear();
-      residuals(x, there);
-      if (there.groups() != at.groups()) return out;
+    J.resize(static_cast<Eigen::Index>(at.r.size()), n);
+    if (derivative) {
+      derivative(out.x, J);
+    } else if (!differentiate(residuals, out.x, at, step, J)) {
+      return out;
     }
-    const std::vector<Normal> blocks = sum_up(at, moved, step, out.scale);
+    const std::vector<Normal> blocks = sum_up(at, J, out.scale);
     const double s2 = out.scale * out.scale;
     Eigen::MatrixXd H = (s2 * prior).asDiagonal();
     Eigen::VectorXd g = s2 * prior.cwiseProduct(out.x - start);

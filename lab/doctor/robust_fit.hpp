@@ -33,10 +33,15 @@ struct Fit {
 };
 
 using ResidualFunction = std::function<void(const Eigen::VectorXd&, Residuals&)>;
+/// Of each row by each parameter.
+using Derivatives = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+/// At a place at which the residuals have just been taken; the derivatives have their size already.
+using DerivativeFunction = std::function<void(const Eigen::VectorXd&, Derivatives&)>;
 
-/// `prior_sigma`: of each parameter about its value at the start (infinite: none). `step`: for derivatives.
+/// `prior_sigma`: of each parameter about its value at the start (infinite: none). `step`: for derivatives by differences, where there is
+/// no `derivative`, and for the end of the search.
 Fit robust_fit(const ResidualFunction& residuals, const Eigen::VectorXd& start, const Eigen::VectorXd& prior_sigma,
-               const Eigen::VectorXd& step, int iterations = 12);
+               const Eigen::VectorXd& step, int iterations = 12, const DerivativeFunction& derivative = nullptr);
 
 /// Robust standard deviation of a row: of the median of the groups' lengths.
 double scale_of(const Residuals& r);

@@ -82,12 +82,13 @@ KILVO_WIDE void add_rows(const Row* rows, std::size_t count, NormalSums& to) {
   }
 }
 
-class Odometry {
- public:
-  explicit Odometry(const Deskew& deskew) : deskew_(deskew) {}
+double middle_of(const Sweep& sweep) { return 0.5 * (sweep.begin + sweep.end); }
 
-  SweepPose step(const Sweep& sweep) {
-    const double middle = 0.5 * (sweep.begin + sweep.end);
+class Odometry final : public SweepRegistration {
+ public:
+  SweepPose step(const Sweep& sweep, const Deskew& deskew) override {
+    deskew_ = deskew;
+    const double middle = middle_of(sweep);
     SweepPose pose = predicted(middle);
     turn(sweep, middle, pose);
     // With the swing taken out it is the place in the middle, else the mean over the sweep.
@@ -265,10 +266,20 @@ class Odometry {
 
 }  // namespace
 
+void ScanOdometry::extend(const std::vector<Sweep>& sweeps, const Deskew& deskew) {
+  const std::size_t before = way_.size();
+  const bool follow = before > 0 && before <= sweeps.size() && middle_of(sweeps[before - 1]) == way_.back().t;
+  if (!follow) {
+    registration_ = std::make_unique<Odometry>();
+    way_.clear();
+  }
+  while (way_.size() < sweeps.size()) way_.push_back(registration_->step(sweeps[way_.size()], deskew));
+}
+
 std::vector<SweepPose> scan_odometry(const std::vector<Sweep>& sweeps, const Deskew& deskew, OdometryRange range) {
-  Odometry odometry(deskew);
+  Odometry odometry;
   std::vector<SweepPose> out;
-  for (std::size_t i = range.begin; i < std::min(range.end, sweeps.size()); ++i) out.push_back(odometry.step(sweeps[i]));
+  for (std::size_t i = range.begin; i < std::min(range.end, sweeps.size()); ++i) out.push_back(odometry.step(sweeps[i], deskew));
   return out;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "kilvo/math/se3.hpp"
@@ -34,6 +35,24 @@ struct Deskew {
 
 struct OdometryRange {
   std::size_t begin = 0, end = SIZE_MAX;  // sweeps
+};
+
+/// One sweep after the other to the surroundings that those before have seen.
+struct SweepRegistration {
+  virtual ~SweepRegistration() = default;
+  virtual SweepPose step(const Sweep& sweep, const Deskew& deskew) = 0;
+};
+
+/// The way so far and the surroundings to which it was registered: sweeps that follow continue both.
+class ScanOdometry {
+ public:
+  /// Registers those of `sweeps` that follow the ones of before, which they begin with; else begins anew.
+  void extend(const std::vector<Sweep>& sweeps, const Deskew& deskew);
+  const std::vector<SweepPose>& way() const { return way_; }
+
+ private:
+  std::unique_ptr<SweepRegistration> registration_;
+  std::vector<SweepPose> way_;
 };
 
 std::vector<SweepPose> scan_odometry(const std::vector<Sweep>& sweeps, const Deskew& deskew, OdometryRange range = {});

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lab/doctor/robust_fit.hpp"
 #include "lab/settings/settings.hpp"
 #include "lab/simulation/description.hpp"
 #include "lab/simulation/simulator.hpp"
@@ -10,12 +11,12 @@
 namespace kilvo::lab {
 namespace {
 
-/// 9 s in a room, of which the robot walks 5, with the true way of its IMU at 10 Hz.
+/// 20 s in a room, of which the robot walks 16, with the true way of its IMU at 10 Hz.
 class StancesOfAWalk : public testing::Test {
  protected:
   static SimulatorConfig config() {
     SimulatorConfig out;
-    out.duration = 9;
+    out.duration = 20;
     out.use = {true, true, false, false};
     return out;
   }
@@ -89,6 +90,41 @@ TEST_F(StancesOfAWalk, LastForMostOfTheWalkAsItIsDescribed) {
   const Standing s = standing_time(legs, robot_, nullptr, way_, gyro_, 0);
   EXPECT_GT(s.moving, 4);
   EXPECT_GT(s.worth(), 0.5 * s.moving);
+}
+
+TEST_F(StancesOfAWalk, TellTheMountAndTheClock) {
+  Recorded late = recorded_;
+  for (LegSample& s : late.legs) s.t += 0.006;
+  Robot turned = robot_;
+  turned.imu.T_link_imu.R = SO3::Exp({0.02, -0.02, 0.03}) * robot_.imu.T_link_imu.R;
+  RecordedLegs legs(late);
+  const StanceFit fit = fit_stances(legs, turned, nullptr, way_, gyro_, 0);
+  ASSERT_TRUE(fit.good);
+  EXPECT_LT((fit.R_link_imu * robot_.imu.T_link_imu.R.inverse()).Log().norm(), 0.004);
+  EXPECT_NEAR(fit.offset, -0.006, 0.0008);
+}
+
+// r = (exp(a x) + b) - y, with outliers.
+TEST(RobustFit, IsTheSameByDerivativesAsByDifferences) {
+  const auto place = [](int i) { return 0.01 * i; };
+  const auto rows = [&place](const Eigen::VectorXd& x, Residuals& out) {
+    out.width = 1;
+    for (int i = 0; i < 200; ++i) {
+      const double y = std::exp(0.7 * place(i)) - 0.3 + 0.01 * std::sin(7.0 * i) + (i % 10 == 0 ? 1 : 0);
+      out.r.push_back(std::exp(x[0] * place(i)) + x[1] - y);
+      out.block.push_back(i / 20);
+    }
+  };
+  const auto derivative = [&place](const Eigen::VectorXd& x, Derivatives& J) {
+    for (int i = 0; i < 200; ++i) J.row(i) << place(i) * std::exp(x[0] * place(i)), 1;
+  };
+  const Eigen::VectorXd start = Eigen::Vector2d(0.5, 0), prior = Eigen::Vector2d(INFINITY, INFINITY), step = Eigen::Vector2d(1e-5, 1e-5);
+  const Fit by_differences = robust_fit(rows, start, prior, step), fit = robust_fit(rows, start, prior, step, 12, derivative);
+  ASSERT_TRUE(fit.good && by_differences.good);
+  EXPECT_NEAR(fit.x[0], 0.7, 0.01);
+  EXPECT_NEAR(fit.x[1], -0.3, 0.01);
+  EXPECT_LT((fit.x - by_differences.x).norm(), 1e-6);
+  EXPECT_LT((fit.cov - by_differences.cov).norm(), 1e-3 * by_differences.cov.norm());
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ constexpr double least_turning = 0.03;        // rad/s rms, below which nothing 
 constexpr double gyro_bias_prior = 0.02;      // rad/s
 // Of the gyro of a robot: rad/s per m/s^2 and, of scales and skew, without a unit.
 constexpr double sensitivity_prior = 1e-3, gyro_axes_prior = 0.005;
-constexpr double resolution = 0.005;  // s, of the search for the offset
+constexpr double resolution = 0.01;  // s, of the search for the offset
 constexpr std::size_t most_offsets = 6;
 
 struct Pair {
@@ -126,10 +126,15 @@ std::vector<double> likely_offsets(const std::vector<Turn>& turns, const GyroPat
   std::vector<double> x, y;
   for (double offset = -reach; offset <= reach; offset += resolution) {
     x.clear(), y.clear();
+    double until = NAN;  // the end of the turn before, which most begin at
+    Eigen::Quaterniond begin, end = Eigen::Quaterniond::Identity();
     for (const Turn& turn : turns) {
       if (!gyro.covers(turn.a + offset, turn.b + offset)) continue;
       const double dt = turn.b - turn.a;
-      x.push_back(std::sqrt(gyro.rate(turn.a + offset, turn.b + offset).norm()));
+      begin = turn.a == until ? end : gyro.at(turn.a + offset);
+      end = gyro.at(turn.b + offset);
+      until = turn.b;
+      x.push_back(std::sqrt(log_of(begin.conjugate() * end).norm() / dt));
       y.push_back(std::sqrt(nearest_length(turn, dt * x.back() * x.back()).norm() / dt));
     }
     if (x.size() < fewest_intervals) continue;
