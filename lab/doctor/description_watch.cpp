@@ -47,7 +47,7 @@ Diagnosis diagnosis_of(const Recorded& recorded, const Robot& robot, Earlier& ea
   const auto unclear = [](const Check& c) { return c.sensor == Sensor::lidar && c.verdict == Check::Verdict::unknown; };
   if (first.findings.empty() && std::ranges::none_of(first.checks, unclear)) return first;
   earlier = {earlier.point_times_are_good, 0, {}, {}};
-  return Examination(recorded, robot, {earlier.point_times_are_good, 0, {}, {}}).run();
+  return Examination(recorded, robot).run();
 }
 
 }  // namespace

@@ -45,8 +45,10 @@ struct Earlier {
 
 class Examination {
  public:
-  Examination(const Recorded& recorded, const Robot& robot, Earlier earlier = {})
-      : recorded_(recorded), robot_(robot), original_(robot), earlier_(std::move(earlier)) {}
+  Examination(const Recorded& recorded, const Robot& robot) : recorded_(recorded), robot_(robot), original_(robot) {}
+  /// Quick: begins with the description, towards which it pulls a clock by a seventh of what that is off, and continues what is known.
+  Examination(const Recorded& recorded, const Robot& robot, Earlier earlier)
+      : recorded_(recorded), robot_(robot), original_(robot), earlier_(std::move(earlier)), described_first_(true) {}
 
   /// All checks, in their order.
   Diagnosis run();
@@ -72,6 +74,7 @@ class Examination {
   void blame_imu_for_all();
   // sweep_examination.cpp
   void register_sweeps();
+  void turn_with(std::vector<SweepPose> way);
   void examine_point_times();
   void deskew_first(Deskew& deskew);
   bool point_times_run_backwards(Deskew deskew);
@@ -147,6 +150,7 @@ class Examination {
   Eigen::Matrix3d accel_axes_ = Eigen::Matrix3d::Identity();
   Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();  // rad/s, by the LiDAR
   Earlier earlier_;
+  bool described_first_ = false;
   bool deskewed_ = false;               // by the gyro as described, as which the sweeps turn
   std::vector<SweepPose> first_, way_;  // the LiDAR's way, so or of rigid sweeps, and with all that the data say
   std::optional<LidarWay> lidar_way_;

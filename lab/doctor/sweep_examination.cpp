@@ -33,23 +33,26 @@ std::vector<Turn> turns_of(const std::vector<SweepPose>& way) {
   return out;
 }
 
-// Deskewed by the gyro as described, if they turn as it does then; else as rigid ones, so that neither mount nor clock can spoil it.
+// Rigid ones, so that neither mount nor clock can spoil it; or deskewed by the gyro as described, if they turn as it does then.
 void Examination::register_sweeps() {
   if (recorded_.sweeps.empty()) return;
-  const SO3 described = robot_.lidar.T_imu_lidar.R;
+  if (described_first_) {
+    if (earlier_.origin != recorded_.origin) earlier_ = {earlier_.point_times_are_good, recorded_.origin, {}, {}};
+    const GyroPath path = gyro();
+    earlier_.described.extend(recorded_.sweeps, {&path, robot_.lidar.T_imu_lidar.R});
+    turn_with(earlier_.described.way());
+    deskewed_ = lidar_.known && lidar_.agrees;
+    const bool turned = lidar_.explained != 0;
+    if (deskewed_ || !turned) return;
+  }
+  turn_with(scan_odometry(recorded_.sweeps, {}));
+}
+
+void Examination::turn_with(std::vector<SweepPose> way) {
   constexpr double least_explained = 0.8;
-  if (earlier_.origin != recorded_.origin) earlier_ = {earlier_.point_times_are_good, recorded_.origin, {}, {}};
-  const GyroPath path = gyro();
-  earlier_.described.extend(recorded_.sweeps, {&path, described});
-  first_ = earlier_.described.way();
+  first_ = std::move(way);
   lidar_turns_ = turns_of(first_);
-  lidar_ = agreement(lidar_turns_, described, least_explained);
-  deskewed_ = lidar_.known && lidar_.agrees;
-  const bool turned = lidar_.explained != 0;
-  if (deskewed_ || !turned) return;
-  first_ = scan_odometry(recorded_.sweeps, {});
-  lidar_turns_ = turns_of(first_);
-  lidar_ = agreement(lidar_turns_, described, least_explained);
+  lidar_ = agreement(lidar_turns_, robot_.lidar.T_imu_lidar.R, least_explained);
 }
 
 // Deskewed with the right times the surroundings are sharpest.
