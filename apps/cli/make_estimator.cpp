@@ -25,7 +25,8 @@ void fit_to_machine(lab::Settings& settings, bool live, int threads) {
   // On a robot the other cores are for others.
   if (live && !settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
   // Legs whose time is looked for up to 0.6 s away may come so much later than the IMU's messages; in a recording they can be waited for.
-  if (!live && settings.leg_clock.clock == "estimated" && !settings.given.contains("estimator.max_wait")) settings.estimator.max_wait += 0.6;
+  if (!live && settings.leg_clock.clock == "estimated" && !settings.given.contains("estimator.max_wait"))
+    settings.estimator.max_wait += 0.6;
   // Reading and the map keep about one core busy.
   if (!settings.given.contains("estimator.threads")) settings.estimator.threads = live ? 1 : std::max(1, threads - 1);
 }
