@@ -1,7 +1,8 @@
-# kilvo_module(NAME [UNIT files] [OPTIMIZATION level] [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
+# kilvo_module(NAME [TESTS_TOGETHER] [UNIT files] [OPTIMIZATION level] [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
 #
 # One folder is one module is one CMake target, `kilvo_NAME` (alias `kilvo::NAME`): every *.cpp is compiled,
 # every *_test.cpp beside it goes into one test program `kilvo_NAME_test`. Every *.hpp compiles alone (scripts/check_headers).
+# TESTS_TOGETHER: its tests are compiled in one unit as well, where they are slow: their local names are all different.
 # What a module may include is listed in modules.txt and checked by scripts/check_modules.
 
 add_library(kilvo_flags INTERFACE)
@@ -30,7 +31,7 @@ function(kilvo_optimization target)
 endfunction()
 
 function(kilvo_module name)
-  cmake_parse_arguments(MODULE "" "UNIT;OPTIMIZATION" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
+  cmake_parse_arguments(MODULE "TESTS_TOGETHER" "UNIT;OPTIMIZATION" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   file(GLOB tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp)
   file(GLOB fuzzers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_fuzz.cpp)
@@ -64,7 +65,9 @@ function(kilvo_module name)
     target_link_libraries(${target}_test PRIVATE ${target} kilvo_flags ${MODULE_PRIVATE} ${MODULE_TEST_DEPENDS} GTest::gmock GTest::gtest_main)
     target_compile_definitions(${target}_test PRIVATE KILVO_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
     kilvo_precompile(${target}_test TEST)
-    kilvo_unity(${target}_test)
+    if(MODULE_TESTS_TOGETHER)
+      kilvo_unity(${target}_test)
+    endif()
     gtest_discover_tests(${target}_test TEST_PREFIX ${name}/ DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
   endif()
   if(fuzzers AND KILVO_BUILD_FUZZERS)
