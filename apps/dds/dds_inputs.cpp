@@ -168,17 +168,17 @@ void DdsInputs::note(const Publisher& publisher, bool is_alive) {
   }
 }
 
-// Why a publisher cannot be heard; empty: it can, and there is a reader for it.
+// Why a publisher cannot be read; empty: it can, and there is a reader for it.
 std::string DdsInputs::misfit_of(Subscription& subscription, const Publisher& publisher) {
   const Sensor sensor = subscription.sensors.front();
-  if (publisher.type == "unitree_go/LowState")
-    return "a publisher sends unitree_go/LowState: the robot has four feet (Go2, B2); KILVO's legs are the two of a humanoid";
+  if (publisher.type == "unitree_go/LowState" && sensor == Sensor::legs)
+    return "a publisher sends unitree_go/LowState (Go2, B2, H1): its legs are not read; what is read are those of a G1, or a JointState";
   const DdsType* type = find_type(publisher.type);
   const bool fits =
       type != nullptr && std::ranges::any_of(subscription.sensors, [&](Sensor s) { return lab::is_type_of(s, publisher.type); });
   if (!fits) return fmt::format("a publisher sends {}, but the sensor {} needs {}", publisher.type, name_of(sensor), accepted_text(sensor));
   if (!publisher.partition.empty())
-    return fmt::format("a publisher is in the partition '{}': KILVO hears the default one", publisher.partition);
+    return fmt::format("a publisher is in the partition '{}': KILVO reads the default one", publisher.partition);
   if (publisher.is_exclusive) return "a publisher's quality of service does not fit: its ownership is exclusive";
   listen_to(subscription, *type);
   return "";

@@ -57,7 +57,7 @@ class Examination {
   const Robot& robot() const { return robot_; }
   /// After run(): what the recording says about mounts, focal length and clocks, with its standard deviations.
   const std::vector<Refinement>& refinements() const { return refinements_; }
-  /// After run() without a finding: for an examination of more of the same recording.
+  /// After run(): for an examination of more of the same recording.
   Earlier for_later() { return std::move(earlier_); }
 
  private:

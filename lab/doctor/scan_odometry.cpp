@@ -97,6 +97,7 @@ class Odometry final : public SweepRegistration {
     pose.end = mean ? sweep.end : middle;
     pose.good = first_ || align(pose);
     keep(pose);
+    deskew_ = {};  // what it points to may be gone at the next sweep
     return pose;
   }
 

@@ -121,7 +121,8 @@ Decoded<UnitreeSample> decode_hg_low_state(const WireMessage& message) {
 Decoded<UnitreeSample> decode_go_low_state(const WireMessage& message) {
   const auto m = read_message<GoLowStateMessage>(message);
   if (!m) return DecodeError{m.reason()};
-  DecodeError four{"unitree_go/LowState: the robot has four feet (Go2, B2); KILVO's legs are the two of a humanoid"};
+  DecodeError four{
+      "unitree_go/LowState (Go2, B2, H1): its legs are not read; what is read are those of a G1 (unitree_hg/LowState), or a JointState"};
   return UnitreeSample{imu_of(m->imu_state.imu), std::move(four), m->tick};
 }
 

@@ -102,7 +102,7 @@ TEST(LowState, FourFeetAreRefusedWithAReason) {
   const auto sample = decode_go_low_state({bytes, Encoding::cdr});
   ASSERT_TRUE(sample) << sample.reason();
   EXPECT_EQ(sample->imu.accel.z(), 9.75);
-  EXPECT_THAT(sample->joints.reason(), HasSubstr("four feet"));
+  EXPECT_THAT(sample->joints.reason(), HasSubstr("its legs are not read"));
 }
 
 TEST(ImuState, OfTheTorsoIsAnImu) {

@@ -37,7 +37,7 @@ void check_value(const Settings& s, const Setting& setting) {
   }
 }
 
-/// Letters, digits and _, none of them empty or with a digit first; / between them.
+/// Names of letters, digits and _, none of them empty or with a digit first; / between them.
 bool is_ros_name(const std::string& name) {
   char before = '/';
   for (const char c : name) {

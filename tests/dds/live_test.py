@@ -18,7 +18,7 @@ SECONDS = 6.0  # of the walk
 
 
 class Program:
-    """A child whose words are kept."""
+    """A child whose output is kept."""
     running: list = []
 
     def __init__(self, *command: str):
@@ -84,7 +84,7 @@ STORY: Story
 
 class LiveTest(unittest.TestCase):
     def tearDown(self):
-        # What a test that failed leaves behind would speak into the next one.
+        # What a test that failed leaves behind would send into the next one.
         for program in Program.running:
             program.end(signal.SIGKILL)
         Program.running.clear()
@@ -156,7 +156,7 @@ class LiveTest(unittest.TestCase):
             STORY.play("--only", "legs", "--legs", "lowstate", "--seconds", "1", *words).process.wait(30)
             self.assertIn(text, live.said())
         dog = STORY.peer("wrong-type", STORY.domain, "2", "rt/lowstate", "unitree_go::msg::dds_::LowState_")
-        self.assertTrue(wait_until(lambda: "the robot has four feet" in live.said()), live.said())
+        self.assertTrue(wait_until(lambda: "(Go2, B2, H1): its legs are not read" in live.said()), live.said())
         dog.end()
         STORY.play("--only", "imu,legs", "--legs", "lowstate", "--seconds", "3").process.wait(30)
         self.assertIn("KI (", live.said())

@@ -1,13 +1,15 @@
 // The other side of `kilvo live` in tests: Fast DDS, which is another vendor's, plays a recording as a robot would, and listens.
 //
-//   peer play BAG DOMAIN [--legs lowstate [--mode-pr N] [--mode-machine N] [--crc N]] [--stamps recorded] [--start S] [--seconds S] [--only
-//   imu,legs,lidar,camera]
-//                                           a line of JSON when it begins: ns of that, and by how much stamps are later than recorded
-//   peer listen DOMAIN FILE.tum SECONDS     odometry into a file, the smooth one into FILE.tum.smooth; at the end a line of JSON: how many
-//   of what peer call DOMAIN SERVICE [0|1]          asks a service as rmw_cyclonedds does (kilvo/save_map; kilvo/pause/lidar 1); its answer
-//   as JSON peer garbage DOMAIN SECONDS             bytes that are no Imu, on the IMU's topic peer wrong-type DOMAIN SECONDS clouds of a
-//   type that the LiDAR's topic should not have peer picky DOMAIN SECONDS               a reader that asks for more durability than there
-//   is
+// clang-format off
+//   peer play BAG DOMAIN [--legs lowstate [--mode-pr N] [--mode-machine N] [--crc N]] [--stamps recorded] [--start S] [--seconds S]
+//             [--only imu,legs,lidar,camera]   a line of JSON when it begins: ns of that, and by how much stamps are later than recorded
+//   peer listen DOMAIN FILE.tum SECONDS       odometry into a file, the smooth one into FILE.tum.smooth, when each pose of the first
+//                                             came into FILE.tum.times (ns: stamp, time); at the end a line of JSON: how many of what
+//   peer call DOMAIN SERVICE [0|1]            asks a service as rmw_cyclonedds does (kilvo/save_map; kilvo/pause/lidar 1); its answer as JSON
+//   peer garbage DOMAIN SECONDS               bytes that are no Imu, on the IMU's topic
+//   peer wrong-type DOMAIN SECONDS            clouds of a type that the LiDAR's topic should not have
+//   peer picky DOMAIN SECONDS                 a reader that asks for more durability than there is
+// clang-format on
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -231,14 +233,16 @@ Time keep_pose(std::vector<char>& bytes, std::ofstream& file) {
 }
 
 int listen(const Words& words) {
-  std::ofstream file(words.plain.at(2)), smooth_file(words.plain.at(2) + ".smooth");
+  std::ofstream file(words.plain.at(2)), smooth_file(words.plain.at(2) + ".smooth"), times(words.plain.at(2) + ".times");
   std::vector<double> late;
   Time first{}, last{};
   int poses = 0;
   double largest_gap = 0;
   Ear odometry([&](std::vector<char>& bytes) {
     const Time t = keep_pose(bytes, file);
-    late.push_back(to_seconds(wall_now() - t));
+    const Time now = wall_now();
+    late.push_back(to_seconds(now - t));
+    times << to_ns(t) << ' ' << to_ns(now) << '\n';
     if (poses++ == 0) first = t;
     if (poses > 1) largest_gap = std::max(largest_gap, to_seconds(t - last));
     last = t;

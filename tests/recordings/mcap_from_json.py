@@ -128,6 +128,7 @@ def main() -> int:
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path)
     parser.add_argument("--read")
+    parser.add_argument("--expect", type=int, help="so many files")
     args = parser.parse_args()
     if not args.folder.is_dir():
         return SKIPPED
@@ -136,7 +137,7 @@ def main() -> int:
         made, differing = make(args.folder, out)
         print(f"{made} files made, {differing} other than the originals", flush=True)
         code = subprocess.run([args.read, str(out)], check=False).returncode if args.read else 0
-    return 0 if made > 0 and differing == 0 and code == 0 else 1
+    return 0 if made == (args.expect or made) and made > 0 and differing == 0 and code == 0 else 1
 
 
 if __name__ == "__main__":

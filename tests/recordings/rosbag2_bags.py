@@ -9,12 +9,12 @@ import subprocess
 import sys
 import tempfile
 
-import yaml
-
 SKIPPED = 77
 
 
 def counts_of_metadata(folder: pathlib.Path) -> dict:
+    import yaml
+
     with open(folder / "metadata.yaml", encoding="utf-8") as file:
         topics = yaml.safe_load(file)["rosbag2_bagfile_information"]["topics_with_message_count"]
     return {topic["topic_metadata"]["name"]: topic["message_count"] for topic in topics}
