@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "lab/doctor/robust_fit.hpp"
+#include "lab/doctor/stances.hpp"
 #include "lab/settings/settings.hpp"
 #include "lab/simulation/description.hpp"
 #include "lab/simulation/simulator.hpp"
@@ -102,6 +103,33 @@ TEST_F(StancesOfAWalk, TellTheMountAndTheClock) {
   ASSERT_TRUE(fit.good);
   EXPECT_LT((fit.R_link_imu * robot_.imu.T_link_imu.R.inverse()).Log().norm(), 0.004);
   EXPECT_NEAR(fit.offset, -0.006, 0.0008);
+}
+
+// Each column of the derivative against central differences, away from where the unknowns are zero. The clock's follows the way between
+// the IMU's samples, of which a difference sees two.
+TEST_F(StancesOfAWalk, HaveTheDerivativesThatTheirDifferencesShow) {
+  RecordedLegs legs(recorded_);
+  Stances stances(legs, robot_, nullptr, way_, gyro_, 0, true);
+  Eigen::VectorXd x = Eigen::VectorXd::Constant(stances.unknowns(), 0.004);
+  x[Stances::of_offset] = 0.0007;
+  stances.find(x, true);
+  ASSERT_GT(stances.stances(), 10U);
+  Residuals at;
+  stances.rows(x, at);
+  Derivatives J(static_cast<Eigen::Index>(at.r.size()), x.size());
+  stances.derivative(x, J);
+  for (Eigen::Index j = 0; j < x.size(); ++j) {
+    const double step = 1e-5;
+    Residuals up, down;
+    Eigen::VectorXd moved = x;
+    moved[j] = x[j] + step;
+    stances.rows(moved, up);
+    moved[j] = x[j] - step;
+    stances.rows(moved, down);
+    const Eigen::Map<const Eigen::VectorXd> r_up(up.r.data(), J.rows()), r_down(down.r.data(), J.rows());
+    const Eigen::VectorXd expected = (r_up - r_down) / (2 * step);
+    EXPECT_LT((J.col(j) - expected).norm(), (j == Stances::of_offset ? 0.05 : 1e-3) * expected.norm()) << "unknown " << j;
+  }
 }
 
 // r = (exp(a x) + b) - y, with outliers.
