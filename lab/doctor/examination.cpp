@@ -130,6 +130,7 @@ SenseAgreement Examination::agreement(const std::vector<Turn>& turns, const SO3&
   out.turning = best.turning;
   constexpr double least_turning = 0.03;  // rad/s
   if (!(best.turning > least_turning)) return out;
+  out.turned = true;
   double offset = 0;
   constexpr double clearly = 0.6;  // of what is not explained
   for (const double candidate : likely_offsets(turns, path)) {

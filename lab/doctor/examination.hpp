@@ -25,6 +25,7 @@ inline constexpr double pose_period = 0.009;   // s, between poses of the legs
 /// How one sense's turning agrees with the gyro's.
 struct SenseAgreement {
   bool present = false;
+  bool turned = false;                                  // enough to be held against the gyro
   bool known = false;                                   // it turned enough, and the gyro explains it under some mount and offset
   bool agrees = false;                                  // under the mount and the clock of the configuration
   Eigen::Matrix3d error = Eigen::Matrix3d::Identity();  // in the IMU frame: measured mount = error * configured mount

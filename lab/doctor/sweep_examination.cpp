@@ -42,8 +42,7 @@ void Examination::register_sweeps() {
     earlier_.described.extend(recorded_.sweeps, {&path, robot_.lidar.T_imu_lidar.R});
     turn_with(earlier_.described.way());
     deskewed_ = lidar_.known && lidar_.agrees;
-    const bool turned = lidar_.explained != 0;
-    if (deskewed_ || !turned) return;
+    if (deskewed_ || !lidar_.turned) return;
   }
   turn_with(scan_odometry(recorded_.sweeps, {}));
 }
