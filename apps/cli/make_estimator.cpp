@@ -4,6 +4,8 @@
 #include <fmt/core.h>
 #include <stdexcept>
 
+#include "kilvo/calibration/rate_offset.hpp"
+
 namespace kilvo::cli {
 
 std::array<bool, sensor_count> as_flags(const std::vector<Sensor>& sensors) {
@@ -24,9 +26,9 @@ Estimator make_estimator(const lab::Settings& settings, const std::vector<Sensor
 void fit_to_machine(lab::Settings& settings, bool live, int threads) {
   // On a robot the other cores are for others.
   if (live && !settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
-  // Legs whose time is looked for up to 0.6 s away may come so much later than the IMU's messages; in a recording they can be waited for.
+  // Legs whose time is looked for may come so much later than the IMU's messages; in a recording they can be waited for.
   if (!live && settings.leg_clock.clock == "estimated" && !settings.given.contains("estimator.max_wait"))
-    settings.estimator.max_wait += 0.6;
+    settings.estimator.max_wait += RateOffset::reach();
   // Reading and the map keep about one core busy.
   if (!settings.given.contains("estimator.threads")) settings.estimator.threads = live ? 1 : std::max(1, threads - 1);
 }

@@ -23,8 +23,9 @@ class RateOffset {
   /// What the other one may have been at its time t, in the same axes: a gyroscope's rate, or that of each foot, of which one stands.
   void add(Time t, std::span<const Eigen::Vector3d> candidates);
 
-  /// To be added to the times of add(), s; nothing while no offset is sure. 0.6 s at most, either way.
+  /// To be added to the times of add(), s; nothing while no offset is sure. reach() at most, either way.
   std::optional<double> offset() const { return is_found_ ? std::optional(offset_) : std::nullopt; }
+  static double reach() { return most * step; }  // s
   /// The larger of both rates within the last second, rad/s.
   double liveliness() const { return std::max(lively_reference_, lively_other_); }
 
