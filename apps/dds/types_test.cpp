@@ -11,7 +11,7 @@
 #include "apps/dds/domain.hpp"
 
 namespace kilvo::dds {
-namespace {
+namespace types_test {
 
 struct Known {
   const char* name;
@@ -67,5 +67,5 @@ TEST(DdsLog, SaysALineOfAKindOnce) {
   EXPECT_EQ(said, (std::vector<std::string>{"DDS: sample #0 of rt/imu cannot be read", "DDS: another one"}));
 }
 
-}  // namespace
+}  // namespace types_test
 }  // namespace kilvo::dds

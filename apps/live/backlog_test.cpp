@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo::live {
-namespace {
+namespace backlog_test {
 
 TEST(Backlog, OldScansAndImagesGiveWayTheImuDoesNot) {
   Backlog backlog;
@@ -40,5 +40,5 @@ TEST(Backlog, GivesWhatIsLeftAfterItsEndAndThenNothing) {
   EXPECT_FALSE(backlog.take(all));
 }
 
-}  // namespace
+}  // namespace backlog_test
 }  // namespace kilvo::live

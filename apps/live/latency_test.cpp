@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo::live {
-namespace {
+namespace latency_test {
 
 TEST(Latency, QuantilesAreRightToAHundredth) {
   Latency latency;
@@ -24,5 +24,5 @@ TEST(Latency, NothingIsZeroAndNothingIsTooLongOrTooShort) {
   EXPECT_LE(latency.quantile(0.5), 1e-7);
 }
 
-}  // namespace
+}  // namespace latency_test
 }  // namespace kilvo::live

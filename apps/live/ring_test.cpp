@@ -6,7 +6,7 @@
 #include "apps/live/handover.hpp"
 
 namespace kilvo::live {
-namespace {
+namespace ring_test {
 
 TEST(Ring, HandsOverEverythingInOrderFromOneThreadToAnother) {
   constexpr int many = 100000;
@@ -64,5 +64,5 @@ TEST(Handover, TheReaderSeesWholeValuesThatNeverGoBack) {
   EXPECT_FALSE(handover.fetch()) << "each value is given once";
 }
 
-}  // namespace
+}  // namespace ring_test
 }  // namespace kilvo::live

@@ -6,7 +6,7 @@
 #include "tests/helpers/test_biped.hpp"
 
 namespace kilvo::node {
-namespace {
+namespace base_frame_test {
 
 // The IMU is fixed to the torso, which the waist turns against the pelvis, the root.
 lab::Settings biped_with_waist() {
@@ -72,5 +72,5 @@ TEST(BaseFrame, WithoutEncodersIsTheImuOrWhatIsRigid) {
   EXPECT_EQ(BaseFrame({}, settings).name(), "base_link");
 }
 
-}  // namespace
+}  // namespace base_frame_test
 }  // namespace kilvo::node

@@ -5,7 +5,7 @@
 #include <random>
 
 namespace kilvo::node {
-namespace {
+namespace body_motion_test {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
@@ -105,5 +105,5 @@ TEST(BodyMotion, SeenFromAnotherWorldOnlyTheAxesOfThePoseChange) {
   EXPECT_LT((there.pose_covariance.topLeftCorner<3, 3>() - turned).norm(), 1e-12);
 }
 
-}  // namespace
+}  // namespace body_motion_test
 }  // namespace kilvo::node

@@ -6,7 +6,7 @@
 #include "apps/node/clouds.hpp"
 
 namespace kilvo::node {
-namespace {
+namespace diagnostics_test {
 
 using std::chrono::milliseconds;
 
@@ -168,5 +168,5 @@ TEST(Clouds, ColoursArePackedAsRvizReadsThem) {
   EXPECT_EQ(cloud.data[14], 0x11);
 }
 
-}  // namespace
+}  // namespace diagnostics_test
 }  // namespace kilvo::node

@@ -9,7 +9,7 @@
 #include "lab/messages/wire_reader.hpp"
 
 namespace kilvo::node {
-namespace {
+namespace state_publisher_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -170,5 +170,5 @@ TEST_F(Publishing, ALevelledWorldIsAStepInMapAndNoneInOdom) {
   EXPECT_NEAR(last_smooth, 0, 1e-3) << "after six times estimator.smooth_time";
 }
 
-}  // namespace
+}  // namespace state_publisher_test
 }  // namespace kilvo::node

@@ -5,7 +5,7 @@
 #include <random>
 
 namespace kilvo {
-namespace {
+namespace clipping_test {
 
 // Steps of a walk: bells of `peak` m/s^2 beside gravity, no two alike, with noise; cut at `range`.
 int marked(ClippingDetector& detector, double peak, double range, int& clipped) {
@@ -73,5 +73,5 @@ TEST(Clipping, IsNotFoundAtRest) {
   }
 }
 
-}  // namespace
+}  // namespace clipping_test
 }  // namespace kilvo

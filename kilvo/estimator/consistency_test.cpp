@@ -12,7 +12,7 @@
 #include "tests/helpers/exact_map.hpp"
 
 namespace kilvo {
-namespace {
+namespace consistency_test {
 
 using Path = lab::AnalyticRoomConfig::Path;
 
@@ -214,5 +214,5 @@ TEST(Consistency, WithItsOwnMapTheErrorIsAsLargeAsTheCovarianceSaysOnAStraightPa
 
 TEST(Consistency, WithItsOwnMapTheErrorIsAsLargeAsTheCovarianceSaysOnALoop) { expect_consistent_with_own_map(Path::loop); }
 
-}  // namespace
+}  // namespace consistency_test
 }  // namespace kilvo

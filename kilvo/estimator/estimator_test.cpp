@@ -10,7 +10,7 @@
 #include "lab/simulation/analytic_room.hpp"
 
 namespace kilvo {
-namespace {
+namespace estimator_test {
 
 constexpr std::array<bool, sensor_count> imu_and_lidar = {true, false, true, false};
 
@@ -240,5 +240,5 @@ TEST(Estimator, SaysWhatItWaitsForUntilItHasStarted) {
   EXPECT_NE(estimator.waiting_for(), "");
 }
 
-}  // namespace
+}  // namespace estimator_test
 }  // namespace kilvo

@@ -6,7 +6,7 @@
 #include <string>
 
 namespace kilvo {
-namespace {
+namespace event_test {
 
 Time at(double s) { return Time(from_seconds(s)); }
 
@@ -53,5 +53,5 @@ TEST(Events, OfWhatGoesOnAreKeptUpToDate) {
   EXPECT_EQ(log.take().size(), 1u);
 }
 
-}  // namespace
+}  // namespace event_test
 }  // namespace kilvo

@@ -7,7 +7,7 @@
 #include "kilvo/sensors/robot.hpp"
 
 namespace kilvo {
-namespace {
+namespace findings_test {
 
 using testing::AllOf;
 using testing::ElementsAre;
@@ -123,5 +123,5 @@ TEST_F(Judged, AnEpochThatBeginsIsInnocent) {
   EXPECT_THAT(findings_.take_events(), ElementsAre(testing::Field(&Event::reason, Reason::diverged))) << "it is told again";
 }
 
-}  // namespace
+}  // namespace findings_test
 }  // namespace kilvo

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace frame_queue_test {
 
 using std::chrono::milliseconds;
 
@@ -98,5 +98,5 @@ TEST(FrameQueue, OfTooManyTheOldestIsGivenBack) {
   EXPECT_TRUE(queue.empty());
 }
 
-}  // namespace
+}  // namespace frame_queue_test
 }  // namespace kilvo

@@ -3,7 +3,7 @@
 #include "kilvo/estimator/history.hpp"
 
 namespace kilvo {
-namespace {
+namespace history_rollback_test {
 
 using std::chrono::milliseconds;
 
@@ -69,5 +69,5 @@ TEST(History, GoesOnAfterARollBack) {
   EXPECT_GT(history.now().P(at::p, at::p), back.P(at::p, at::p));
 }
 
-}  // namespace
+}  // namespace history_rollback_test
 }  // namespace kilvo

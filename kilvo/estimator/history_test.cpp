@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace history_test {
 
 using std::chrono::milliseconds;
 
@@ -155,5 +155,5 @@ TEST(History, HowTheImuMovedIsKnownFromShortlyBeforeTheBase) {
   EXPECT_FALSE(history.motion_since(time(100))) << "too long ago";
 }
 
-}  // namespace
+}  // namespace history_test
 }  // namespace kilvo

@@ -5,7 +5,7 @@
 #include <numbers>
 
 namespace kilvo {
-namespace {
+namespace initialise_test {
 
 // Feeds a constant sample (plus `shake` on the gyro) at 200 Hz until there is a start; gives up after `patience` seconds.
 std::optional<Start> start_from(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel, double shake = 0, double patience = 5,
@@ -146,5 +146,5 @@ TEST(Initialiser, SaysWhatItWaitsFor) {
   EXPECT_NE(initialiser.waiting_for().find("first IMU sample"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace initialise_test
 }  // namespace kilvo

@@ -10,7 +10,7 @@
 #include "lab/simulation/analytic_room.hpp"
 
 namespace kilvo {
-namespace {
+namespace legs_test {
 
 using std::chrono::milliseconds;
 
@@ -259,5 +259,5 @@ TEST(Legs, ThatAreNotUsedAreCounted) {
   EXPECT_GT(dropped(r, Sensor::legs, "not used"), 900u);
 }
 
-}  // namespace
+}  // namespace legs_test
 }  // namespace kilvo

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace levelling_test {
 
 // A world whose z axis is 0.5 degrees off, in which gravity becomes known after 4 s.
 Output walking(double s) {
@@ -115,5 +115,5 @@ TEST(Levelling, LeavesAWorldAloneWhoseGravityNobodyLearnt) {
   EXPECT_EQ(levelling.turn()->Log().norm(), 0);
 }
 
-}  // namespace
+}  // namespace levelling_test
 }  // namespace kilvo

@@ -7,7 +7,7 @@
 #include "kilvo/estimator/estimator.hpp"
 
 namespace kilvo {
-namespace {
+namespace live_propagator_test {
 
 using std::chrono::milliseconds;
 
@@ -158,5 +158,5 @@ TEST_F(LiveStanding, AStateThatIsNotFiniteGoesNowhere) {
   EXPECT_LT(live_.output().x.p.norm(), 0.01);
 }
 
-}  // namespace
+}  // namespace live_propagator_test
 }  // namespace kilvo

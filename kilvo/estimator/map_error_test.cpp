@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace map_error_test {
 
 const SE3 somewhere = {SO3::Exp({0.1, -0.2, 2.0}), {3, -2, 0.5}};
 
@@ -64,5 +64,5 @@ TEST(MapError, AnEpochLastsWhileTheUncertaintyDoes) {
   EXPECT_NE(error.epoch_now(somewhere, diagonal(1e-6, 2e-4)), first);
 }
 
-}  // namespace
+}  // namespace map_error_test
 }  // namespace kilvo

@@ -5,7 +5,7 @@
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
-namespace {
+namespace replay_test {
 
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
@@ -327,5 +327,5 @@ TEST(Replay, AMissedSampleMakesTheVelocityAsUncertainAsTheSignalIsRough) {
   EXPECT_LT(after(0.1, true), 0.004);
 }
 
-}  // namespace
+}  // namespace replay_test
 }  // namespace kilvo

@@ -5,7 +5,7 @@
 #include "kilvo/input/timeline.hpp"
 
 namespace kilvo {
-namespace {
+namespace scan_recutter_test {
 
 using std::chrono::milliseconds;
 
@@ -50,5 +50,5 @@ TEST(ScanRecutter, WithoutImagesScansGoOn) {
   EXPECT_GE(scans, 5U);
 }
 
-}  // namespace
+}  // namespace scan_recutter_test
 }  // namespace kilvo

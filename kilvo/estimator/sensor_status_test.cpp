@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace sensor_status_test {
 
 Time at(double s) { return Time(from_seconds(s)); }
 
@@ -71,5 +71,5 @@ TEST(SensorStatus, LegsThatComeAgainWaitForCalmOrForASecond) {
   EXPECT_TRUE(status.may_legs_return(at(5), false, false, health)) << "they were never there";
 }
 
-}  // namespace
+}  // namespace sensor_status_test
 }  // namespace kilvo

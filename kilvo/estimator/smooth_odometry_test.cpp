@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace smooth_odometry_test {
 
 // On a circle of 1 m at 0.5 m/s, `jump` beside it from 2 s on.
 Output on_circle(double s, const Eigen::Vector3d& jump) {
@@ -64,5 +64,5 @@ TEST(SmoothOdometry, TakesACorrectionInAsFastAtEveryRate) {
   }
 }
 
-}  // namespace
+}  // namespace smooth_odometry_test
 }  // namespace kilvo

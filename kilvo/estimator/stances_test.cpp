@@ -10,7 +10,7 @@
 #include "tests/helpers/synthetic_gait.hpp"
 
 namespace kilvo {
-namespace {
+namespace stances_test {
 
 using test::SoleMotion;
 
@@ -217,5 +217,5 @@ TEST(Stances, AfterARestartBothFeetLeaveAndEnterAnewInOneStep) {
   EXPECT_LT(filter.error().norm(), 0.001);
 }
 
-}  // namespace
+}  // namespace stances_test
 }  // namespace kilvo

@@ -5,7 +5,7 @@
 #include "tests/helpers/exact_map.hpp"
 
 namespace kilvo {
-namespace {
+namespace world_map_test {
 
 // What a robot 1 m above a floor of 10 m by 10 m sees of it, and how it has been registered.
 Registration floor_sweep() {
@@ -85,5 +85,5 @@ TEST(WorldMap, WhatIsRegisteredToANewMapStaysAsUncertainAsThat) {
   EXPECT_GT(std::sqrt(map.error_at(first.posterior.x.pose())(3, 3)), 6.9) << "lost twice";
 }
 
-}  // namespace
+}  // namespace world_map_test
 }  // namespace kilvo

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace gap_test {
 
 Time at_seconds(double s) { return Time(from_seconds(s)); }
 
@@ -44,5 +44,5 @@ TEST(GapInflation, TurnsMoreAboutTheVerticalThanItLeans) {
   EXPECT_GT(e.P(at::R + 2, at::R + 2), 10 * e.P(at::R, at::R));
 }
 
-}  // namespace
+}  // namespace gap_test
 }  // namespace kilvo

@@ -4,7 +4,7 @@
 #include <random>
 
 namespace kilvo {
-namespace {
+namespace innovation_test {
 
 // A prior of covariance P, and a measurement of covariance R whose error is `wrong` times larger.
 double mean_of_innovations(double wrong, InnovationScale* scale) {
@@ -58,5 +58,5 @@ TEST(InnovationScale, ForgetsWhatHasPassed) {
   EXPECT_EQ(scale.variance(), 1);
 }
 
-}  // namespace
+}  // namespace innovation_test
 }  // namespace kilvo

@@ -8,7 +8,7 @@
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
-namespace {
+namespace long_run_test {
 
 #ifdef NDEBUG
 constexpr int total_steps = 1'000'000;
@@ -73,5 +73,5 @@ TEST(LongRun, TheCovarianceStaysSymmetricPositiveDefiniteOverAMillionMixedSteps)
   EXPECT_LT((e.x.R.matrix().transpose() * e.x.R.matrix() - Eigen::Matrix3d::Identity()).norm(), 1e-12);
 }
 
-}  // namespace
+}  // namespace long_run_test
 }  // namespace kilvo

@@ -5,7 +5,7 @@
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
-namespace {
+namespace predict_test {
 
 const Time begin_time = time_from_ns(1'700'000'000'000'000'000);
 
@@ -229,5 +229,5 @@ TEST(Predict, AnEmptyIntervalChangesNothing) {
   EXPECT_LT((after.P - e.P).norm(), 1e-15);
 }
 
-}  // namespace
+}  // namespace predict_test
 }  // namespace kilvo

@@ -6,7 +6,7 @@
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
-namespace {
+namespace state_test {
 
 TEST(State, BoxminusUndoesBoxplus) {
   test::Random random(1);
@@ -78,5 +78,5 @@ TEST(State, ANonFiniteNumberAnywhereIsFound) {
   }
 }
 
-}  // namespace
+}  // namespace state_test
 }  // namespace kilvo

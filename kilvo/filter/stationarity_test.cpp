@@ -6,7 +6,7 @@
 #include <vector>
 
 namespace kilvo {
-namespace {
+namespace stationarity_test {
 
 Time time_at(double s) { return Time(from_seconds(s)); }
 
@@ -65,5 +65,5 @@ TEST(StationarityDetector, TakesAnImpactForUnusualAndForgetsIt) {
   EXPECT_TRUE(detector.is_usual(s.t, std::chrono::milliseconds(20)));
 }
 
-}  // namespace
+}  // namespace stationarity_test
 }  // namespace kilvo

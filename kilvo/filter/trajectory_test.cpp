@@ -5,7 +5,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace trajectory_test {
 
 const Time start = time_from_ns(1'700'000'000'000'000'000);
 
@@ -120,5 +120,5 @@ TEST(Trajectory, ClearedItIsEmpty) {
   EXPECT_FALSE(trajectory.at(at_ms(50)));
 }
 
-}  // namespace
+}  // namespace trajectory_test
 }  // namespace kilvo

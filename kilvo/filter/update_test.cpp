@@ -6,7 +6,7 @@
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
-namespace {
+namespace update_test {
 
 using Matrix = Eigen::MatrixXd;
 
@@ -277,5 +277,5 @@ TEST(Update, TheCovarianceShrinksAndIsSymmetricToTheBit) {
   }
 }
 
-}  // namespace
+}  // namespace update_test
 }  // namespace kilvo

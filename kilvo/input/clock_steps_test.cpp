@@ -4,7 +4,7 @@
 #include <limits>
 
 namespace kilvo {
-namespace {
+namespace clock_steps_test {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
@@ -275,5 +275,5 @@ TEST(ClockSteps, ARecordingThatIsPlayedAgainIsARestartWithItsOwnStamps) {
   EXPECT_EQ(stamp_of(m), at(seconds(1)));
 }
 
-}  // namespace
+}  // namespace clock_steps_test
 }  // namespace kilvo

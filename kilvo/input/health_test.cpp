@@ -6,7 +6,7 @@
 #include <string_view>
 
 namespace kilvo {
-namespace {
+namespace health_test {
 
 using std::chrono::milliseconds;
 
@@ -102,5 +102,5 @@ TEST(Health, SilenceOfTheImuIsCountedByTheOthersStampsAndNotByTheirAbsence) {
   EXPECT_NEAR(health.imu_silence(), 0.15, 1e-9);
 }
 
-}  // namespace
+}  // namespace health_test
 }  // namespace kilvo

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace input_queue_test {
 
 constexpr std::array<bool, sensor_count> imu_and_lidar = {true, false, true, false};
 constexpr Duration max_wait = std::chrono::milliseconds(200);
@@ -121,5 +121,5 @@ TEST(InputQueue, ARecordingPlayedAgainIsAnotherEpochThatBeginsWithItsFirstMeasur
   EXPECT_EQ(stamp_of(all[1]), imu_at(0.005 * i).t) << "its own stamps";
 }
 
-}  // namespace
+}  // namespace input_queue_test
 }  // namespace kilvo

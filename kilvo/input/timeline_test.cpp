@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace timeline_test {
 
 constexpr std::array<bool, sensor_count> with_lidar = {true, false, true, false};
 
@@ -208,5 +208,5 @@ TEST(Timeline, WithoutTheImuNoSensorFillsTheMemory) {
   EXPECT_GT(given_up, 400u);
 }
 
-}  // namespace
+}  // namespace timeline_test
 }  // namespace kilvo

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace clearance_window_test {
 
 using std::chrono::milliseconds;
 
@@ -55,5 +55,5 @@ TEST(ClearanceWindow, TheOldestGoFirst) {
   EXPECT_NEAR(window.trend(milliseconds(400)).value(), 1.0, 1e-9);
 }
 
-}  // namespace
+}  // namespace clearance_window_test
 }  // namespace kilvo

@@ -6,7 +6,7 @@
 #include "tests/helpers/contact_watch.hpp"
 
 namespace kilvo {
-namespace {
+namespace contact_estimator_test {
 
 using test::Change;
 using test::Gait;
@@ -125,5 +125,5 @@ TEST(ContactEstimator, ClearanceIsTheHeightOverTheLastPlaceOfTheFoot) {
   EXPECT_LT(estimator.contacts().d_fv[1], 1) << "it stands";
 }
 
-}  // namespace
+}  // namespace contact_estimator_test
 }  // namespace kilvo

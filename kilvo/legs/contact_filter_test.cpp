@@ -8,7 +8,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace contact_filter_test {
 
 // A walk as its cues say it: 0.6 s of stance, 0.4 s of swing for each foot.
 struct Walk {
@@ -178,5 +178,5 @@ double lateness(bool with_impacts) {
 
 TEST(ContactFilter, ImpactsThatComeWithTouchdownsBringThemForward) { EXPECT_LT(lateness(true), 0.8 * lateness(false)); }
 
-}  // namespace
+}  // namespace contact_filter_test
 }  // namespace kilvo

@@ -5,7 +5,7 @@
 #include "tests/helpers/contact_watch.hpp"
 
 namespace kilvo {
-namespace {
+namespace contact_life_test {
 
 using test::Change;
 using test::Gait;
@@ -77,5 +77,5 @@ TEST(ContactEstimator, ARobotThatIsAlreadyWalkingIsUnderstoodAfterItsFirstSteps)
   test::expect_changes(gait, all, 5.9, 8.45, 0.03, 0.03);
 }
 
-}  // namespace
+}  // namespace contact_life_test
 }  // namespace kilvo

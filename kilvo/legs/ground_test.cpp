@@ -7,7 +7,7 @@
 #include "tests/helpers/surface_groups.hpp"
 
 namespace kilvo {
-namespace {
+namespace ground_test {
 
 using Eigen::Vector3d;
 
@@ -99,5 +99,5 @@ TEST(Ground, UnderAFootIsTheMapsAndWithoutOneThatOfTheContacts) {
   EXPECT_LT(steepness(*ground.under(&map, {30, 0, 0}, up)), 0.1) << "beyond the map";
 }
 
-}  // namespace
+}  // namespace ground_test
 }  // namespace kilvo

@@ -8,7 +8,7 @@
 #include "tests/helpers/test_biped.hpp"
 
 namespace kilvo {
-namespace {
+namespace leg_kinematics_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -262,5 +262,5 @@ TEST(LegKinematics, TheTwoFeetMessageIsTurnedMovedAndLoweredToTheSole) {
   EXPECT_THAT(fault_of(legs, s), HasSubstr("six"));
 }
 
-}  // namespace
+}  // namespace leg_kinematics_test
 }  // namespace kilvo

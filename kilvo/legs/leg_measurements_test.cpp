@@ -7,7 +7,7 @@
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
-namespace {
+namespace leg_measurements_test {
 
 SolePoint random_point(test::Random& random) { return {random.vector3(0.7), random.vector3(1)}; }
 
@@ -299,5 +299,5 @@ TEST(LegMeasurements, AtLiftOffNothingOfTheFootIsLeftAndNothingElseChanges) {
   EXPECT_EQ(e.P(at::tau, at::tau), before(at::tau, at::tau));
 }
 
-}  // namespace
+}  // namespace leg_measurements_test
 }  // namespace kilvo

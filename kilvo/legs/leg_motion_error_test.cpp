@@ -7,7 +7,7 @@
 #include <random>
 
 namespace kilvo {
-namespace {
+namespace leg_motion_error_test {
 
 constexpr double mount = 0.01, length = 0.01, gyro_scale = 0.003;  // one standard deviation of each
 
@@ -144,5 +144,5 @@ TEST(LegMotionError, WhatIsLearntIsNotConsideredAnyMore) {
   EXPECT_GT(known.error(x)(5, 5), 0.9 * unknown.error(x)(5, 5));  // the vertical
 }
 
-}  // namespace
+}  // namespace leg_motion_error_test
 }  // namespace kilvo

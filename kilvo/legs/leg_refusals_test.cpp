@@ -9,7 +9,7 @@
 #include "tests/helpers/test_biped.hpp"
 
 namespace kilvo {
-namespace {
+namespace leg_refusals_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -97,5 +97,5 @@ TEST(LegKinematics, AFloatingJointOnTheWayIsRefusedUnlessItIsLocked) {
   EXPECT_EQ(refusal_of(robot), "no exception");
 }
 
-}  // namespace
+}  // namespace leg_refusals_test
 }  // namespace kilvo

@@ -6,7 +6,7 @@
 #include "kilvo/math/so3.hpp"
 
 namespace kilvo {
-namespace {
+namespace level_ground_test {
 
 // A robot that sets down one foot after the other, 0.3 m along x and 0.2 m across, as its legs measure that.
 class GroundWalk {
@@ -126,5 +126,5 @@ TEST(LevelGround, NothingIsLeftOfAFloorAfterARestart) {
   EXPECT_TRUE(!patch || patch->point.z() > 0.9);
 }
 
-}  // namespace
+}  // namespace level_ground_test
 }  // namespace kilvo

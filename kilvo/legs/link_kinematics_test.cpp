@@ -6,7 +6,7 @@
 #include "tests/helpers/test_biped.hpp"
 
 namespace kilvo {
-namespace {
+namespace link_kinematics_test {
 
 TEST(LinkKinematics, AFootIsWhereAProductOfMatricesPutsIt) {
   test::Random random(1);
@@ -58,5 +58,5 @@ TEST(LinkKinematics, LockedJointsMakeItRigidAndMissingOnesUnknown) {
   EXPECT_THROW(LinkKinematics(robot, "tail"), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace link_kinematics_test
 }  // namespace kilvo

@@ -7,7 +7,7 @@
 #include "tests/helpers/contact_watch.hpp"
 
 namespace kilvo {
-namespace {
+namespace paper_contacts_test {
 
 using std::chrono::milliseconds;
 
@@ -230,5 +230,5 @@ TEST(ContactDetector, OnlyThePapersAdaptsRowByRow) {
   }
 }
 
-}  // namespace
+}  // namespace paper_contacts_test
 }  // namespace kilvo

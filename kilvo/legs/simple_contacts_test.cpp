@@ -5,7 +5,7 @@
 #include "tests/helpers/synthetic_gait.hpp"
 
 namespace kilvo {
-namespace {
+namespace simple_contacts_test {
 
 const test::Gait gait{.first = 1.0};
 
@@ -53,5 +53,5 @@ TEST(VarianceContacts, AJoltIsTheTouchdownOfTheFootThatWasHigh) {
   EXPECT_EQ(right, landed);
 }
 
-}  // namespace
+}  // namespace simple_contacts_test
 }  // namespace kilvo

@@ -5,7 +5,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace sole_noise_test {
 
 TEST(SoleNoise, LearnsWhatStaysAfterAveragingOverTheCorrelationTime) {
   test::Random random(1);
@@ -86,5 +86,5 @@ TEST(SoleNoise, WhatManyStancesHaveInCommonIsAnErrorOfTheState) {
   EXPECT_NEAR(own.noise.vertical(), 0.03, 0.015);
 }
 
-}  // namespace
+}  // namespace sole_noise_test
 }  // namespace kilvo

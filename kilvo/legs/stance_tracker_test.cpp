@@ -9,7 +9,7 @@
 #include "tests/helpers/synthetic_gait.hpp"
 
 namespace kilvo {
-namespace {
+namespace stance_tracker_test {
 
 const ImuSample level_imu = {Time{}, Eigen::Vector3d::Zero(), Eigen::Vector3d(0, 0, standard_gravity)};
 
@@ -228,5 +228,5 @@ TEST(StanceTracker, TheGroundCountsOnceAtEachTouchdownAndOnlyWhereThereIsAMap) {
   }
 }
 
-}  // namespace
+}  // namespace stance_tracker_test
 }  // namespace kilvo

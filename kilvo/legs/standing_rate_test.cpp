@@ -8,7 +8,7 @@
 #include "tests/helpers/synthetic_gait.hpp"
 
 namespace kilvo {
-namespace {
+namespace standing_rate_test {
 
 // A robot that stands: the turn of its body and what of it each sole shows, as rotation vectors over time.
 struct Stand {
@@ -127,5 +127,5 @@ TEST(StandingRate, FeetThatArePointsSayNothingOfTheTurn) {
   EXPECT_EQ(read(stand, 4).readings, 0);
 }
 
-}  // namespace
+}  // namespace standing_rate_test
 }  // namespace kilvo

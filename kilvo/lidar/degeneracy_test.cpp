@@ -8,7 +8,7 @@
 #include "tests/helpers/surface_groups.hpp"
 
 namespace kilvo {
-namespace {
+namespace degeneracy_test {
 
 const Eigen::Vector3d x_axis = Eigen::Vector3d::UnitX(), y_axis = Eigen::Vector3d::UnitY(), z_axis = Eigen::Vector3d::UnitZ();
 
@@ -144,5 +144,5 @@ TEST(Degeneracy, ProjectingOutLeavesNothingAlongTheWeakDirectionInAnyUnits) {
   EXPECT_LT((W * W - W).norm(), 1e-12);
 }
 
-}  // namespace
+}  // namespace degeneracy_test
 }  // namespace kilvo

@@ -9,7 +9,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace downsample_test {
 
 std::vector<PointXYZI> random_points(test::Random& random, int count) {
   std::vector<PointXYZI> points;
@@ -93,5 +93,5 @@ TEST(Downsample, OfNothingIsNothingAndOfOnePointThatPoint) {
   EXPECT_EQ(clusters[0].scatter.norm(), 0);
 }
 
-}  // namespace
+}  // namespace downsample_test
 }  // namespace kilvo

@@ -7,7 +7,7 @@
 #include "tests/helpers/exact_map.hpp"
 
 namespace kilvo {
-namespace {
+namespace lidar_pipeline_test {
 
 using std::chrono::milliseconds;
 
@@ -231,5 +231,5 @@ TEST(LidarPipeline, WhatAFoundSweepDoesNotHoldIsSearchedForAgainForTwoSeconds) {
   EXPECT_FALSE(s.measured(whole, prior).searched);
 }
 
-}  // namespace
+}  // namespace lidar_pipeline_test
 }  // namespace kilvo

@@ -5,7 +5,7 @@
 #include <random>
 
 namespace kilvo {
-namespace {
+namespace mount_error_test {
 
 constexpr double degree = M_PI / 180;
 
@@ -83,5 +83,5 @@ TEST(MountError, CoversWhatAWrongMountDoesToAPose) {
   EXPECT_LT((D - sigma * sigma * sum).norm(), 1e-4 * D.norm());
 }
 
-}  // namespace
+}  // namespace mount_error_test
 }  // namespace kilvo

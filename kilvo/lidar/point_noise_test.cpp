@@ -6,7 +6,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace point_noise_test {
 
 const LidarConfig config;
 
@@ -33,5 +33,5 @@ TEST(PointNoise, AlongANormalIsTheQuadraticForm) {
   }
 }
 
-}  // namespace
+}  // namespace point_noise_test
 }  // namespace kilvo

@@ -8,7 +8,7 @@
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
-namespace {
+namespace point_to_plane_test {
 
 TEST(PointToPlane, TheJacobianIsTheDerivativeAt200RandomStates) {
   test::Random random(1);
@@ -217,5 +217,5 @@ TEST(ToWorld, GroupsAreTheClustersSeenFromTheWorld) {
   EXPECT_EQ(groups[0].count, 5);
 }
 
-}  // namespace
+}  // namespace point_to_plane_test
 }  // namespace kilvo

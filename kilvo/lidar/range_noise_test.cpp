@@ -4,7 +4,7 @@
 #include <random>
 
 namespace kilvo {
-namespace {
+namespace range_noise_test {
 
 /// Sweeps of a LiDAR at the origin of the IMU frame that sees patches of surfaces all around it, three metres away.
 class Sweeps {
@@ -72,5 +72,5 @@ TEST(RangeNoise, OfTooFewSurfacesIsTheDescribedOne) { EXPECT_EQ(learnt(0.04, 0.0
 
 TEST(RangeNoise, OfTooFewPointsIsTheDescribedOne) { EXPECT_EQ(learnt(0.04, 0.02, 500, 7, 0), 0.02); }
 
-}  // namespace
+}  // namespace range_noise_test
 }  // namespace kilvo

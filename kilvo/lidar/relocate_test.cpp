@@ -6,7 +6,7 @@
 #include "tests/helpers/exact_map.hpp"
 
 namespace kilvo {
-namespace {
+namespace relocate_test {
 
 struct Place {
   lab::AnalyticRoom room{lab::AnalyticRoomConfig{}};
@@ -115,5 +115,5 @@ TEST(Relocation, IsNotNeededAlongWhatSweepsDoNotKnow) {
   EXPECT_FALSE(needs_search(e.P, known));
 }
 
-}  // namespace
+}  // namespace relocate_test
 }  // namespace kilvo

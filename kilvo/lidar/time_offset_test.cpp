@@ -4,7 +4,7 @@
 #include <random>
 
 namespace kilvo {
-namespace {
+namespace time_offset_test {
 
 struct Walked {
   TimeOffset check;
@@ -54,5 +54,5 @@ TEST(TimeOffset, OfAClockThatHasStartedToBeOffIsFound) {
   EXPECT_TRUE(check.offset(0.002));
 }
 
-}  // namespace
+}  // namespace time_offset_test
 }  // namespace kilvo

@@ -8,7 +8,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace undistort_test {
 
 constexpr Duration scan_time = std::chrono::milliseconds(100);
 
@@ -166,5 +166,5 @@ TEST(Undistort, WithoutPointsOrWithoutAPoseNothingComesOut) {
   EXPECT_EQ(drops.outside_trajectory, 6U);
 }
 
-}  // namespace
+}  // namespace undistort_test
 }  // namespace kilvo

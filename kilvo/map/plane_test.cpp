@@ -7,7 +7,7 @@
 #include "tests/helpers/surface_groups.hpp"
 
 namespace kilvo {
-namespace {
+namespace plane_test {
 
 constexpr double max_roughness = 0.01;  // m
 
@@ -174,5 +174,5 @@ TEST(Moments, GroupsStandForTheirPoints) {
   }
 }
 
-}  // namespace
+}  // namespace plane_test
 }  // namespace kilvo

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace visual_map_test {
 
 VisualPoint point_at(double x, double y = 0.1, double z = 0.1) {
   VisualPoint p;
@@ -116,5 +116,5 @@ TEST(VisualMap, AFrameThatNothingWasTakenFromIsUsedAgain) {
   EXPECT_NE(map.add_frame({}), first);
 }
 
-}  // namespace
+}  // namespace visual_map_test
 }  // namespace kilvo

@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 namespace kilvo {
-namespace {
+namespace voxel_index_test {
 
 TEST(VoxelIndex, AgreesWithAnUnorderedMapOverAMillionRandomActions) {
   std::mt19937_64 random(1);
@@ -67,5 +67,5 @@ TEST(FastFloor, IsFloorForBothSignsAndAtIntegers) {
   }
 }
 
-}  // namespace
+}  // namespace voxel_index_test
 }  // namespace kilvo

@@ -8,7 +8,7 @@
 #include "tests/helpers/surface_groups.hpp"
 
 namespace kilvo {
-namespace {
+namespace voxel_map_test {
 
 const Eigen::Vector3d x_axis = Eigen::Vector3d::UnitX(), y_axis = Eigen::Vector3d::UnitY(), z_axis = Eigen::Vector3d::UnitZ();
 
@@ -291,5 +291,5 @@ TEST(VoxelMap, AFloorUnderGrazingBeamsStays) {
   for (double x = -4.9; x < 5; x += 0.5) EXPECT_NE(map.plane_at({x, 0.5 * x, -1}), nullptr) << x;
 }
 
-}  // namespace
+}  // namespace voxel_map_test
 }  // namespace kilvo

@@ -6,7 +6,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace deterministic_sum_test {
 
 std::vector<double> values_of_all_sizes(std::size_t count) {
   test::Random random(1);
@@ -54,5 +54,5 @@ TEST(Workers, SumOfNothingIsZeroAndCallsNothing) {
   }
 }
 
-}  // namespace
+}  // namespace deterministic_sum_test
 }  // namespace kilvo

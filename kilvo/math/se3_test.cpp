@@ -5,7 +5,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace se3_test {
 
 TEST(SE3, CompositionAppliesTheRightOneFirst) {
   test::Random random(1);
@@ -28,5 +28,5 @@ TEST(SE3, InverseUndoesItOnBothSides) {
   }
 }
 
-}  // namespace
+}  // namespace se3_test
 }  // namespace kilvo

@@ -9,7 +9,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace so3_test {
 
 constexpr double pi = std::numbers::pi;
 
@@ -127,5 +127,5 @@ TEST(SO3, QuaternionAndMatrixAreTheSameRotation) {
   }
 }
 
-}  // namespace
+}  // namespace so3_test
 }  // namespace kilvo

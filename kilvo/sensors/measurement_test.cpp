@@ -4,7 +4,7 @@
 #include <string>
 
 namespace kilvo {
-namespace {
+namespace measurement_test {
 
 TEST(Measurement, KnowsItsSensorAndStamp) {
   const Time t = time_from_ns(1'700'000'000'000'000'007);
@@ -24,5 +24,5 @@ TEST(Measurement, KnowsItsSensorAndStamp) {
   EXPECT_EQ(std::size(cases), static_cast<std::size_t>(sensor_count));
 }
 
-}  // namespace
+}  // namespace measurement_test
 }  // namespace kilvo

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace time_test {
 
 TEST(Time, KeepsEveryNanosecondOfAStampOfToday) {
   for (const std::int64_t ns : {0L, 1L, -1L, 1'700'000'000'123'456'789L, 9'223'372'036'854'775'807L}) {
@@ -28,5 +28,5 @@ TEST(Time, SecondsComeBackExactly) {
   EXPECT_DOUBLE_EQ(to_seconds(Duration(1'500'000'000)), 1.5);
 }
 
-}  // namespace
+}  // namespace time_test
 }  // namespace kilvo

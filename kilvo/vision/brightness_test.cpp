@@ -4,7 +4,7 @@
 #include <random>
 
 namespace kilvo {
-namespace {
+namespace brightness_test {
 
 std::vector<double> noisy(std::size_t count, double around, double sigma, std::mt19937& random) {
   std::normal_distribution<double> normal(around, sigma);
@@ -41,5 +41,5 @@ TEST(Brightness, OneOrEqualOnesAreTakenAsTheyAre) {
   EXPECT_GT(brightness_of({0.4, 0.4, 0.4}).sigma, 0);
 }
 
-}  // namespace
+}  // namespace brightness_test
 }  // namespace kilvo

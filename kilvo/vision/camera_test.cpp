@@ -11,7 +11,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace camera_test {
 
 using ::testing::HasSubstr;
 using Vector = Eigen::Vector3d;
@@ -239,5 +239,5 @@ TEST(Camera, RefusesNumbersThatMakeNoSenseByTheirKey) {
   EXPECT_EQ(refusal([](auto& m) { m.distortion.assign(5, 0.0); }), "no error");
 }
 
-}  // namespace
+}  // namespace camera_test
 }  // namespace kilvo

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo {
-namespace {
+namespace colours_test {
 
 using Rgb = std::array<std::uint8_t, 3>;
 using Points = std::vector<Eigen::Vector4f>;
@@ -100,5 +100,5 @@ TEST(Colours, NearPointsWeighMoreAndOverexposedOnesLittle) {
   EXPECT_LT(colours({seen_at(10, 20, 1)}, image)[0].weight, 0.1F * found[1].weight);
 }
 
-}  // namespace
+}  // namespace colours_test
 }  // namespace kilvo

@@ -4,7 +4,7 @@
 #include <random>
 
 namespace kilvo {
-namespace {
+namespace mount_check_test {
 
 // What a camera that is turned by psi shows to a robot that looks about.
 MountCheck looked_about(const Eigen::Vector3d& psi, double noise, int views, const Eigen::Vector3d& reach) {
@@ -67,5 +67,5 @@ TEST(MountCheck, WhoNeverTurnsLearnsNothing) {
   EXPECT_FALSE(looked_about({0.05, 0.05, 0.05}, 1e-3, 1000, Eigen::Vector3d::Constant(1e-3)).misalignment());
 }
 
-}  // namespace
+}  // namespace mount_check_test
 }  // namespace kilvo

@@ -7,7 +7,7 @@
 #include "tests/helpers/tiny_scene.hpp"
 
 namespace kilvo {
-namespace {
+namespace photometric_test {
 
 // A map that has seen the scene once, from the origin.
 class Photometric : public testing::Test {
@@ -237,5 +237,5 @@ TEST_F(Photometric, WhatStandsInFrontHidesWhatIsBehind) {
   }
 }
 
-}  // namespace
+}  // namespace photometric_test
 }  // namespace kilvo

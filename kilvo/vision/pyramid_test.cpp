@@ -7,7 +7,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace {
+namespace pyramid_test {
 
 template <class Function>
 GreyImage drawn(int width, int height, Function&& value) {
@@ -155,5 +155,5 @@ TEST(Sample, IsBilinearBetweenPixels) {
   EXPECT_FLOAT_EQ(sample(image.pixels.data(), image.width, 1.5F, 0.5F), 40);
 }
 
-}  // namespace
+}  // namespace pyramid_test
 }  // namespace kilvo

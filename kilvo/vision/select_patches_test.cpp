@@ -5,7 +5,7 @@
 #include "tests/helpers/tiny_scene.hpp"
 
 namespace kilvo {
-namespace {
+namespace select_patches_test {
 
 // A wall along which a robot walks: far away on one side of a patch, near on the other.
 struct Wall {
@@ -44,5 +44,5 @@ TEST(WarpBetween, IsExactForAPlaneAndAPinhole) {
 
 TEST(WarpBetween, ALensThatBendsLittleChangesItLittle) { EXPECT_LT(largest_error(tiny::Scene::mount(), true), 0.005); }
 
-}  // namespace
+}  // namespace select_patches_test
 }  // namespace kilvo

@@ -5,7 +5,7 @@
 #include "tests/helpers/tiny_scene.hpp"
 
 namespace kilvo {
-namespace {
+namespace visual_pipeline_test {
 
 // A camera that is carried before a wall.
 class BeforeTheWall {
@@ -87,5 +87,5 @@ TEST(VisualPipeline, AViewIsNotJudgedByTheImageThatItWasTakenFrom) {
   EXPECT_GT(full, 100) << "points had all the views that they may";
 }
 
-}  // namespace
+}  // namespace visual_pipeline_test
 }  // namespace kilvo

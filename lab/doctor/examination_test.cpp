@@ -11,7 +11,7 @@
 #include "lab/simulation/simulator.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace examination_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -265,5 +265,5 @@ TEST(ScanOdometry, ContinuesTheWayThatItHas) {
   expect_equal(odometry.way(), scan_odometry(others, {}));
 }
 
-}  // namespace
+}  // namespace examination_test
 }  // namespace kilvo::lab

@@ -10,7 +10,7 @@
 #include "lab/simulation/simulator.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace stance_fit_test {
 
 /// 20 s in a room, of which the robot walks 16, with the true way of its IMU at 10 Hz.
 class StancesOfAWalk : public testing::Test {
@@ -155,5 +155,5 @@ TEST(RobustFit, IsTheSameByDerivativesAsByDifferences) {
   EXPECT_LT((fit.cov - by_differences.cov).norm(), 1e-3 * by_differences.cov.norm());
 }
 
-}  // namespace
+}  // namespace stance_fit_test
 }  // namespace kilvo::lab

@@ -6,7 +6,7 @@
 #include <random>
 
 namespace kilvo::lab {
-namespace {
+namespace align_test {
 
 using Eigen::Vector3d;
 using ::testing::HasSubstr;
@@ -162,5 +162,5 @@ TEST(Match, RefusesPosesOutOfOrder) {
   EXPECT_THAT(error_of(poses, sampled(0, 1, 0.1)), HasSubstr("not in the order of time"));
 }
 
-}  // namespace
+}  // namespace align_test
 }  // namespace kilvo::lab

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 namespace kilvo::lab {
-namespace {
+namespace consistency_test {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -72,5 +72,5 @@ TEST(Nees, RefusesACovarianceThatIsNone) {
   EXPECT_THROW(nees({}, {}, P), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace consistency_test
 }  // namespace kilvo::lab

@@ -11,7 +11,7 @@
 #include "lab/evaluation/csv_reader.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace contacts_test {
 
 using testing::AllOf;
 using testing::DoubleNear;
@@ -227,5 +227,5 @@ TEST(Contacts, FilesAreReadByColumnName) {
   std::filesystem::remove(path);
 }
 
-}  // namespace
+}  // namespace contacts_test
 }  // namespace kilvo::lab

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo::lab {
-namespace {
+namespace csv_reader_test {
 
 using testing::ElementsAre;
 using testing::StartsWith;
@@ -70,5 +70,5 @@ TEST(CsvReader, AFileThatIsMissingEmptyOrAFolderIsAnError) {
   EXPECT_THAT(error_of([] { CsvReader(std::filesystem::path("/tmp")); }), StartsWith("/tmp: cannot be read: "));
 }
 
-}  // namespace
+}  // namespace csv_reader_test
 }  // namespace kilvo::lab

@@ -6,7 +6,7 @@
 #include <random>
 
 namespace kilvo::lab {
-namespace {
+namespace decimal_time_test {
 
 std::int64_t ns(std::string_view text) {
   const auto t = parse_seconds(text);
@@ -106,5 +106,5 @@ TEST(AppendFixed, WritesWhatPrintfWrites) {
   for (const double x : {0.0, -0.0, -1e-7, 0.0625, 0.1875, 2.5, 1e10, -1e300}) expect_same(x, 3);
 }
 
-}  // namespace
+}  // namespace decimal_time_test
 }  // namespace kilvo::lab

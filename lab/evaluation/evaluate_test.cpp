@@ -8,7 +8,7 @@
 #include <random>
 
 namespace kilvo::lab {
-namespace {
+namespace evaluate_test {
 
 using Eigen::Vector3d;
 using ::testing::HasSubstr;
@@ -221,5 +221,5 @@ TEST(Report, TextReadsInMillimetresAndMetres) {
   EXPECT_THAT(text, HasSubstr("YES (error 1.250 m, limit 1.000 m)"));
 }
 
-}  // namespace
+}  // namespace evaluate_test
 }  // namespace kilvo::lab

@@ -7,7 +7,7 @@
 #include <sstream>
 
 namespace kilvo::lab {
-namespace {
+namespace trajectory_file_test {
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
@@ -129,5 +129,5 @@ TEST_F(TumFile, AnUnwritablePathAndAFullDiskAreErrorsThatNameThePath) {
   EXPECT_THROW(full.close(), TrajectoryOutputError);
 }
 
-}  // namespace
+}  // namespace trajectory_file_test
 }  // namespace kilvo::lab

@@ -9,7 +9,7 @@
 #include <tuple>
 
 namespace kilvo::lab {
-namespace {
+namespace map_builder_test {
 
 using Points = std::vector<Eigen::Vector4f>;
 
@@ -288,5 +288,5 @@ TEST(MapBuilder, KeepsNoMoreThanItMayAndNothingWhenItIsSwitchedOff) {
   EXPECT_EQ(none.size(), 0u);
 }
 
-}  // namespace
+}  // namespace map_builder_test
 }  // namespace kilvo::lab

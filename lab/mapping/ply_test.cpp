@@ -7,7 +7,7 @@
 #include <sstream>
 
 namespace kilvo::lab {
-namespace {
+namespace ply_test {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
@@ -203,5 +203,5 @@ TEST_F(Ply, ATurnedMapIsTheSameMapTurned) {
   }
 }
 
-}  // namespace
+}  // namespace ply_test
 }  // namespace kilvo::lab

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo::lab {
-namespace {
+namespace bytes_test {
 
 constexpr std::array<std::uint8_t, 7> seven{2, 0, 0, 0, 'h', 'i', 9};
 
@@ -36,5 +36,5 @@ TEST(ByteReader, AnArrayLongerThanTheRestIsNotGiven) {
   EXPECT_FALSE(elements.ok());
 }
 
-}  // namespace
+}  // namespace bytes_test
 }  // namespace kilvo::lab

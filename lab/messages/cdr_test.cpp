@@ -11,7 +11,7 @@
 #include "lab/messages/wire_writer.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace cdr_test {
 
 using Content = std::vector<std::uint8_t>;
 const Time stamp = time_from_ns(1'700'000'000'000'000'001);
@@ -128,5 +128,5 @@ TEST(TypeNames, AreTheSameWhoeverWritesThem) {
   EXPECT_EQ(ros2_type_name("sensor_msgs/msg/Imu"), "sensor_msgs/msg/Imu");
 }
 
-}  // namespace
+}  // namespace cdr_test
 }  // namespace kilvo::lab

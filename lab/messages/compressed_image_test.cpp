@@ -8,7 +8,7 @@
 #include "lab/messages/raw_image.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace compressed_image_test {
 
 using File = std::vector<std::uint8_t>;
 
@@ -166,5 +166,5 @@ TEST(DecodeCompressedImage, SurvivesEveryFlippedByte) {
   }
 }
 
-}  // namespace
+}  // namespace compressed_image_test
 }  // namespace kilvo::lab

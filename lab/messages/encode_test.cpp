@@ -5,7 +5,7 @@
 #include "lab/messages/message_decoder.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace encode_test {
 
 const PointTimeFormat absolute_ns{"timestamp", "float64", TimeUnit::nanoseconds, TimeReference::absolute, true};
 
@@ -37,5 +37,5 @@ TEST(AcceptedTypes, BothLivoxDriversAreLidars) {
   EXPECT_TRUE(sensors_of_type("sensor_msgs/CameraInfo").empty());
 }
 
-}  // namespace
+}  // namespace encode_test
 }  // namespace kilvo::lab

@@ -6,7 +6,7 @@
 #include "lab/messages/encode.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace inertial_and_joints_test {
 
 const Time stamp = time_from_ns(1'700'000'000'000'000'001);
 
@@ -74,5 +74,5 @@ TEST(DecodeJointState, RefusesCountsThatTheBytesCannotHold) {
   EXPECT_FALSE(decode_joint_state(with_counts(0, 0x20000000)));  // times 8 bytes it would be 0 in 32 bits
 }
 
-}  // namespace
+}  // namespace inertial_and_joints_test
 }  // namespace kilvo::lab

@@ -5,7 +5,7 @@
 #include "lab/messages/tiny_cloud.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace livox_test {
 
 const Time stamp = time_from_ns(1'700'000'000'000'000'000);
 const auto stamp_ns = static_cast<std::uint64_t>(to_ns(stamp));
@@ -79,5 +79,5 @@ TEST(DecodeLivox, AnEmptyCloudIsACloud) {
   EXPECT_TRUE(decoded->scan.points.empty());
 }
 
-}  // namespace
+}  // namespace livox_test
 }  // namespace kilvo::lab

@@ -7,7 +7,7 @@
 #include "lab/messages/wire_writer.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace message_schema_test {
 
 using testing::HasSubstr;
 using Content = std::vector<std::uint8_t>;
@@ -111,5 +111,5 @@ TEST(MessageSchema, AMessageThatDoesNotFitItsDefinitionIsRefused) {
   }
 }
 
-}  // namespace
+}  // namespace message_schema_test
 }  // namespace kilvo::lab

@@ -8,7 +8,7 @@
 #include "lab/messages/tiny_cloud.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace point_cloud2_test {
 
 const PointTimeFormat untimed;
 const PointTimeFormat seconds_from_start{"time", "float32", TimeUnit::seconds, TimeReference::scan_start, true};
@@ -210,5 +210,5 @@ TEST(DecodePointCloud2, TwentyThousandPointsTakeFarLessThanAMillisecond) {
   RecordProperty("microseconds", static_cast<int>(best.count() / 1000));
 }
 
-}  // namespace
+}  // namespace point_cloud2_test
 }  // namespace kilvo::lab

@@ -7,7 +7,7 @@
 #include "lab/messages/tiny_cloud.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace point_time_test {
 
 constexpr Duration period = std::chrono::milliseconds(100);
 constexpr std::uint32_t points = 200;
@@ -215,5 +215,5 @@ TEST(PointTime, LivoxMessagesMustNotHaveEqualTimesEither) {
   EXPECT_EQ(format->text(), "offset_time (uint32): nanoseconds, from the scan's start");
 }
 
-}  // namespace
+}  // namespace point_time_test
 }  // namespace kilvo::lab

@@ -7,7 +7,7 @@
 #include "lab/messages/encode.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace raw_image_test {
 
 using Pixels = std::vector<std::uint8_t>;
 
@@ -121,5 +121,5 @@ TEST(DecodeImage, ReadsWhatEncodeWrites) {
   }
 }
 
-}  // namespace
+}  // namespace raw_image_test
 }  // namespace kilvo::lab

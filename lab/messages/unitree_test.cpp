@@ -6,7 +6,7 @@
 #include "lab/messages/tiny_low_state.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace unitree_test {
 
 using testing::HasSubstr;
 
@@ -114,5 +114,5 @@ TEST(ImuState, OfTheTorsoIsAnImu) {
   EXPECT_EQ(std::get<ImuSample>(decoded->measurement).gyro, Eigen::Vector3d(1, 2, 3));
 }
 
-}  // namespace
+}  // namespace unitree_test
 }  // namespace kilvo::lab

@@ -8,7 +8,7 @@
 #include "lab/recordings/tiny_bag.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace description_test {
 
 const MessageType odometry{"nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7", ""};
 
@@ -83,5 +83,5 @@ TEST(DescribeRecording, ACutRecordingIsDescribedAsFarAsItGoes) {
   EXPECT_NEAR(imu.rate, 100, 1e-9);
 }
 
-}  // namespace
+}  // namespace description_test
 }  // namespace kilvo::lab

@@ -6,7 +6,7 @@
 #include <numeric>
 
 namespace kilvo::lab {
-namespace {
+namespace inflate_test {
 
 using Data = std::vector<std::uint8_t>;
 
@@ -85,5 +85,5 @@ TEST(InflateAnything, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(inflate_chunk("lz4", {}, 1).fault, "has no data");
 }
 
-}  // namespace
+}  // namespace inflate_test
 }  // namespace kilvo::lab

@@ -10,7 +10,7 @@
 #include "lab/recordings/tiny_bag.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace mcap_reader_test {
 
 using Content = std::vector<std::uint8_t>;
 using Compression = McapWriter::Compression;
@@ -217,5 +217,5 @@ TEST(Crc32, IsThatOfZlib) {
   EXPECT_EQ(crc32(bytes.subspan(4), crc32(bytes.first(4))), 0xCBF43926U);
 }
 
-}  // namespace
+}  // namespace mcap_reader_test
 }  // namespace kilvo::lab

@@ -8,7 +8,7 @@
 #include "lab/recordings/tiny_bag.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace recording_source_test {
 
 RecordingOptions use(std::initializer_list<Sensor> sensors) {
   RecordingOptions options;
@@ -254,5 +254,5 @@ TEST(RecordingSource, TwoReadingsGiveTheSameBytes) {
   }
 }
 
-}  // namespace
+}  // namespace recording_source_test
 }  // namespace kilvo::lab

@@ -8,7 +8,7 @@
 #include "lab/recordings/tiny_bag.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace rosbag1_damage_test {
 
 using Content = std::vector<std::uint8_t>;
 
@@ -236,5 +236,5 @@ TEST(DamagedChunk, AFalseInflatedSizeCostsNoMemory) {
   }
 }
 
-}  // namespace
+}  // namespace rosbag1_damage_test
 }  // namespace kilvo::lab

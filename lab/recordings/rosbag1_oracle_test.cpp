@@ -7,7 +7,7 @@
 #include "lab/recordings/tiny_bag.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace rosbag1_oracle_test {
 
 void run_oracle(const std::string& arguments) {
   const std::string command = "/usr/bin/python3 " KILVO_SOURCE_DIR "/lab/recordings/rosbag_oracle.py " + arguments;
@@ -117,5 +117,5 @@ TEST_P(RosbagOfPython, WeReadWhatPythonWrites) {
 INSTANTIATE_TEST_SUITE_P(Compressions, RosbagOfPython, ::testing::Values("none", "bz2", "lz4"),
                          [](const auto& param) { return std::string(param.param); });
 
-}  // namespace
+}  // namespace rosbag1_oracle_test
 }  // namespace kilvo::lab

@@ -8,7 +8,7 @@
 #include "lab/recordings/tiny_bag.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace rosbag1_reader_test {
 
 const MessageType text_type{"std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n"};
 
@@ -213,5 +213,5 @@ TEST(Rosbag1Writer, SaysWhenAFileCannotBeWritten) {
       OutputError);
 }
 
-}  // namespace
+}  // namespace rosbag1_reader_test
 }  // namespace kilvo::lab

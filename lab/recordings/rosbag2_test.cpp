@@ -13,7 +13,7 @@
 #include "lab/recordings/tiny_bag.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace rosbag2_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -210,5 +210,5 @@ TEST_F(DamagedDb3, AnotherDatabaseIsRefused) {
   EXPECT_THROW(Db3Reader{FileBytes(Content{'S', 'Q', 'L'})}, InputError);
 }
 
-}  // namespace
+}  // namespace rosbag2_test
 }  // namespace kilvo::lab

@@ -5,7 +5,7 @@
 #include "lab/messages/input_error.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace topic_choice_test {
 
 using Connections = std::map<std::uint32_t, Channel>;
 
@@ -73,5 +73,5 @@ TEST(EditDistance, CountsChanges) {
   EXPECT_EQ(edit_distance("/livox/imu", "/livox/imu"), 0U);
 }
 
-}  // namespace
+}  // namespace topic_choice_test
 }  // namespace kilvo::lab

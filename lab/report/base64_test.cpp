@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo::lab {
-namespace {
+namespace base64_test {
 
 std::string encoded(const std::string& text) { return base64(std::vector<std::uint8_t>(text.begin(), text.end())); }
 
@@ -19,5 +19,5 @@ TEST(Base64, GivesTheTextsOfTheStandard) {
   EXPECT_EQ(encoded("\xff\xfb\xbf"), "//u/");
 }
 
-}  // namespace
+}  // namespace base64_test
 }  // namespace kilvo::lab

@@ -9,7 +9,7 @@
 #include "lab/evaluation/trajectory_file.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace comparison_test {
 
 using testing::HasSubstr;
 namespace fs = std::filesystem;
@@ -69,5 +69,5 @@ TEST_F(CompareRuns, TableAndPageNameRunsAndAlignment) {
   EXPECT_EQ(lines, 8);  // truth and two runs from above and from the side, two errors
 }
 
-}  // namespace
+}  // namespace comparison_test
 }  // namespace kilvo::lab

@@ -7,7 +7,7 @@
 #include <numbers>
 
 namespace kilvo::lab {
-namespace {
+namespace figures_test {
 
 using testing::DoubleNear;
 using testing::ElementsAre;
@@ -208,5 +208,5 @@ TEST(Playback, PutsTheLegsWhereTheRobotIs) {
   EXPECT_TRUE(playback_of(time_base, RunFiles{}).is_null());
 }
 
-}  // namespace
+}  // namespace figures_test
 }  // namespace kilvo::lab

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo::lab {
-namespace {
+namespace thin_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -59,5 +59,5 @@ TEST(ThinPoints, AreSpreadEvenlyOverASurface) {
 
 TEST(ThinPoints, ManyInOnePlaceAreCut) { EXPECT_THAT(thin_points(std::vector<Eigen::Vector3f>(1000, {1, 2, 3}), 10), SizeIs(10)); }
 
-}  // namespace
+}  // namespace thin_test
 }  // namespace kilvo::lab

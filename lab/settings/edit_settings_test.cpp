@@ -5,7 +5,7 @@
 #include "lab/settings/settings.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace edit_settings_test {
 
 const std::string text =
     "# a robot\nimu:\n  topic: /imu  # as recorded\n  T_link_imu: {link: pelvis, p: [0, 0, 1], R: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\nlidar:\n  "
@@ -30,5 +30,5 @@ TEST(EditSettings, ARotationReplacesItsOtherSpellings) {
             "lidar:\n  T_imu_lidar:\n    p: [0, 0, 0]\n    R: [1]\n");
 }
 
-}  // namespace
+}  // namespace edit_settings_test
 }  // namespace kilvo::lab

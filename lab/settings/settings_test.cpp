@@ -9,7 +9,7 @@
 #include "lab/settings/show_settings.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace settings_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -279,5 +279,5 @@ TEST(Settings, EveryKeyIsThereOnceAndHasAMeaning) {
   }
 }
 
-}  // namespace
+}  // namespace settings_test
 }  // namespace kilvo::lab

@@ -8,7 +8,7 @@
 #include "lab/settings/settings.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace shipped_legs_test {
 
 Robot shipped(const std::string& name) {
   return load_settings(std::filesystem::path(KILVO_SOURCE_DIR) / "config/robots" / (name + ".yaml")).robot;
@@ -42,5 +42,5 @@ TEST_P(ShippedG1, HasFeetThatAreMirrorImagesAtZeroJoints) {
 
 INSTANTIATE_TEST_SUITE_P(Robots, ShippedG1, testing::Values("g1", "g1_cam_r", "g1_tilt", "g1_tilt_cam_r"));
 
-}  // namespace
+}  // namespace shipped_legs_test
 }  // namespace kilvo::lab

@@ -8,7 +8,7 @@
 #include "lab/settings/setting_list.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace show_settings_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -180,5 +180,5 @@ TEST_F(UrdfInSettings, AFileThatIsNoConfigurationIsRefused) {
   EXPECT_THROW(load_settings(folder_ / "zeros.yaml"), ConfigError);
 }
 
-}  // namespace
+}  // namespace show_settings_test
 }  // namespace kilvo::lab

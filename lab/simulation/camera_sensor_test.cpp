@@ -7,7 +7,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace camera_sensor_test {
 
 using test::all_of;
 using test::only;
@@ -92,5 +92,5 @@ TEST(Camera, MotionBlurSmearsWhatAMovingCameraSees) {
   EXPECT_LT(sharpness(8), 0.8 * sharpness(1));
 }
 
-}  // namespace
+}  // namespace camera_sensor_test
 }  // namespace kilvo::lab

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace kilvo::lab {
-namespace {
+namespace failures_test {
 
 constexpr Time begin = time_from_ns(1'000'000'000);
 
@@ -166,5 +166,5 @@ TEST(Failures, ABlockedLidarSeesANarrowSector) {
   EXPECT_EQ(scans[2].points[1].intensity, 4);
 }
 
-}  // namespace
+}  // namespace failures_test
 }  // namespace kilvo::lab

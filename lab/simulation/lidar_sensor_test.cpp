@@ -7,7 +7,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace lidar_sensor_test {
 
 using test::all_of;
 using test::only;
@@ -126,5 +126,5 @@ TEST(Lidar, TheMiddleOfTheCorridorSaysNothingAboutTheWayAlongIt) {
   EXPECT_EQ(along(18), 0);
 }
 
-}  // namespace
+}  // namespace lidar_sensor_test
 }  // namespace kilvo::lab

@@ -10,7 +10,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace rough_test {
 
 using test::all_of;
 using test::only;
@@ -314,5 +314,5 @@ TEST(RoughRecord, NamesWhatWasDone) {
   EXPECT_THAT(text, Not(HasSubstr("lidar:")));
 }
 
-}  // namespace
+}  // namespace rough_test
 }  // namespace kilvo::lab

@@ -6,7 +6,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace simulator_test {
 
 using test::all_of;
 using test::only;
@@ -121,5 +121,5 @@ TEST(Simulator, EncodersAreQuantisedOffsetAndNoisy) {
   EXPECT_LT(worst, 3e-3);
 }
 
-}  // namespace
+}  // namespace simulator_test
 }  // namespace kilvo::lab

@@ -13,7 +13,7 @@
 #include "lab/simulation/world.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace walk_test {
 
 using ::testing::HasSubstr;
 
@@ -285,5 +285,5 @@ TEST(Footing, AFootOnASlopeLiesOnItAndOneOverAnEdgeLiesLevel) {
   EXPECT_EQ((over_edge.R * Eigen::Vector3d::UnitX()).z(), 0.0);
 }
 
-}  // namespace
+}  // namespace walk_test
 }  // namespace kilvo::lab

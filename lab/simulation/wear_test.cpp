@@ -6,7 +6,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace wear_test {
 
 using test::all_of;
 using test::scenario;
@@ -185,5 +185,5 @@ TEST(Wear, OnePartAloneIsTheSameAsAmongTheOthers) {
   EXPECT_NE(a.back().position, b.back().position);
 }
 
-}  // namespace
+}  // namespace wear_test
 }  // namespace kilvo::lab

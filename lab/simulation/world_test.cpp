@@ -8,7 +8,7 @@
 #include "lab/simulation/walk.hpp"
 
 namespace kilvo::lab {
-namespace {
+namespace world_test {
 
 // How near anything comes to the middle of the pelvis and of the torso, sideways.
 double nearest_wall(const World& world, const Walk& walk) {
@@ -38,5 +38,5 @@ TEST(World, NobodyWalksThroughFurniture) {
 
 TEST(World, AnUnknownNameIsRefused) { EXPECT_THROW(make_scene("moon", 1), std::invalid_argument); }
 
-}  // namespace
+}  // namespace world_test
 }  // namespace kilvo::lab

@@ -43,7 +43,7 @@ void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std
 void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
 
 namespace kilvo {
-namespace {
+namespace leg_path_test {
 
 struct LegWalk {
   explicit LegWalk(double seconds) : config(of(seconds)), simulator(room(), config) {}
@@ -121,5 +121,5 @@ TEST(LivePropagator, TakesNoMemoryOnceItIsWarm) {
   EXPECT_EQ(allocations, 0) << "in " << outputs << " outputs";
 }
 
-}  // namespace
+}  // namespace leg_path_test
 }  // namespace kilvo

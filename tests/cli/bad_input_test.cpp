@@ -6,7 +6,7 @@
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
-namespace {
+namespace bad_input_test {
 
 namespace fs = std::filesystem;
 using testing::AllOf;
@@ -236,5 +236,5 @@ TEST_F(BadInput, AMapThatCannotBeWrittenIsNoticedBeforeTheInputIsRead) {
   EXPECT_THAT(f.err, HasSubstr("/proc/kilvo"));
 }
 
-}  // namespace
+}  // namespace bad_input_test
 }  // namespace kilvo::stories

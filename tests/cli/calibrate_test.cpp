@@ -8,7 +8,7 @@
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
-namespace {
+namespace calibrate_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -102,5 +102,5 @@ TEST_F(Calibrate, RefusesWhatNoSettingMends) {
   EXPECT_THAT(f.out, HasSubstr("left_knee_joint"));
 }
 
-}  // namespace
+}  // namespace calibrate_test
 }  // namespace kilvo::stories

@@ -2,7 +2,7 @@
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
-namespace {
+namespace formats_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -118,5 +118,5 @@ TEST_F(Formats, TheLogOfARunIsAnMcapFile) {
   EXPECT_FALSE(fs::exists(out() + "/run.mcap")) << "that of the run before would be wrong";
 }
 
-}  // namespace
+}  // namespace formats_test
 }  // namespace kilvo::stories

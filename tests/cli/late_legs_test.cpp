@@ -5,7 +5,7 @@
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
-namespace {
+namespace late_legs_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -45,5 +45,5 @@ TEST_F(LateLegs, AreWaitedForInARecordingWhenTheirTimeIsLookedFor) {
   EXPECT_LT(errors(truth, "odometry.tum").ate_rmse_m, 0.05);
 }
 
-}  // namespace
+}  // namespace late_legs_test
 }  // namespace kilvo::stories

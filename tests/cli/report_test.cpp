@@ -6,7 +6,7 @@
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
-namespace {
+namespace report_test {
 
 namespace fs = std::filesystem;
 using testing::AllOf;
@@ -251,5 +251,5 @@ TEST(EvalContacts, PrintsTextOrJson) {
   EXPECT_THAT(bad.err, HasSubstr("bad.csv:1: there is no column 'right'"));
 }
 
-}  // namespace
+}  // namespace report_test
 }  // namespace kilvo::stories

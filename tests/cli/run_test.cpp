@@ -6,7 +6,7 @@
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
-namespace {
+namespace run_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -189,5 +189,5 @@ TEST_F(Run, CtrlCWritesWhatIsThere) {
   EXPECT_LT(poses, 399000);
 }
 
-}  // namespace
+}  // namespace run_test
 }  // namespace kilvo::stories

@@ -8,7 +8,7 @@
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
-namespace {
+namespace simulate_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -281,5 +281,5 @@ TEST(Simulate, HelpListsTheScenarios) {
     EXPECT_THAT(f.out, HasSubstr(name));
 }
 
-}  // namespace
+}  // namespace simulate_test
 }  // namespace kilvo::stories

@@ -2,7 +2,7 @@
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
-namespace {
+namespace usage_test {
 
 namespace fs = std::filesystem;
 using testing::AllOf;
@@ -210,5 +210,5 @@ TEST_F(Verbs, TheDemoGoesFromNothingToAMap) {
   expect_error({"demo", "--duration", "1"}, 2, "--duration");
 }
 
-}  // namespace
+}  // namespace usage_test
 }  // namespace kilvo::stories

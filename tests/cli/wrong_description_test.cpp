@@ -8,7 +8,7 @@
 #include "tests/cli/story.hpp"
 
 namespace kilvo::stories {
-namespace {
+namespace wrong_description_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -151,5 +151,5 @@ TEST_F(WrongDescription, OfTheOnlySenseThatNoSettingMendsLeavesNoResults) {
   EXPECT_THAT(result("summary.json"), HasSubstr("the robot's description is wrong"));
 }
 
-}  // namespace
+}  // namespace wrong_description_test
 }  // namespace kilvo::stories

@@ -20,7 +20,7 @@
 #include "tests/consistency/known_world.hpp"
 
 namespace kilvo {
-namespace {
+namespace walk_test {
 
 double number_of(const char* variable, double otherwise) {
   const char* text = std::getenv(variable);
@@ -316,5 +316,5 @@ TEST_F(Consistency, OnTheLegsAloneVelocityAndTiltAreNotBelievedMoreThanTheyAreKn
   EXPECT_GE(tilt.inside, 0.9) << "mean NEES of tilt " << tilt.mean;
 }
 
-}  // namespace
+}  // namespace walk_test
 }  // namespace kilvo

@@ -16,7 +16,7 @@
 #include "tests/cli/program.hpp"
 
 namespace kilvo::stories {
-namespace {
+namespace datasets_test {
 
 using lab::Encoding;
 
@@ -228,5 +228,5 @@ INSTANTIATE_TEST_SUITE_P(Each, PublicDataset,
                                          Dataset{"hr2_kilo", "KIL", true, false, false}, Dataset{"liko", "KIL", false, true, false}),
                          [](const auto& each) { return each.param.name; });
 
-}  // namespace
+}  // namespace datasets_test
 }  // namespace kilvo::stories

@@ -7,7 +7,7 @@
 #include "kilvo/sensors/reason.hpp"
 
 namespace kilvo {
-namespace {
+namespace events_test {
 
 TEST(Reasons, AreListedInTheDocuments) {
   std::ifstream file(std::string(KILVO_SOURCE_DIR) + "/docs/events.md");
@@ -20,5 +20,5 @@ TEST(Reasons, AreListedInTheDocuments) {
   }
 }
 
-}  // namespace
+}  // namespace events_test
 }  // namespace kilvo

@@ -12,7 +12,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo {
-namespace {
+namespace leavers_test {
 
 constexpr double arrives = 2, watched = 2;  // s
 
@@ -154,5 +154,5 @@ INSTANTIATE_TEST_SUITE_P(All, Leavers,
                                          Case{"stand", 4000, box, 0}, Case{"room", 4000, person, 0.05}, Case{"room", 20000, person, 0.08},
                                          Case{"room", 20000, box, 0.05}));
 
-}  // namespace
+}  // namespace leavers_test
 }  // namespace kilvo

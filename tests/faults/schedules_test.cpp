@@ -8,7 +8,7 @@
 #include "tests/faults/failing_walk.hpp"
 
 namespace kilvo {
-namespace {
+namespace schedules_test {
 
 using lab::Failure;
 using lab::FailureKind;
@@ -76,5 +76,5 @@ TEST(Schedules, OfRandomFailuresAreOutlived) {
   std::printf("%d of %d schedules good\n", count - bad, count);
 }
 
-}  // namespace
+}  // namespace schedules_test
 }  // namespace kilvo

@@ -8,7 +8,7 @@
 #include "tests/faults/failing_walk.hpp"
 
 namespace kilvo {
-namespace {
+namespace senses_test {
 
 using lab::Failure;
 using lab::FailureKind;
@@ -337,5 +337,5 @@ TEST_F(Senses, WithoutAnyImuMessageAllElseIsDroppedAndTold) {
     EXPECT_THAT(warnings_of(estimator.statistics()), testing::Contains(said));
 }
 
-}  // namespace
+}  // namespace senses_test
 }  // namespace kilvo

@@ -9,7 +9,7 @@
 #include "tests/faults/failing_walk.hpp"
 
 namespace kilvo {
-namespace {
+namespace stories_test {
 
 using lab::Failure;
 using lab::FailureKind;
@@ -256,5 +256,5 @@ TEST_F(Faults, ASensorThatComesLateOrNever) {
   }
 }
 
-}  // namespace
+}  // namespace stories_test
 }  // namespace kilvo

@@ -12,7 +12,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo {
-namespace {
+namespace leg_clock_test {
 
 // What is wrong with the clocks of a robot. The IMU's stamps are right.
 struct Fault {
@@ -271,5 +271,5 @@ TEST(TickCounter, WrapsAround) {
   EXPECT_EQ(later - first, std::chrono::milliseconds(5));
 }
 
-}  // namespace
+}  // namespace leg_clock_test
 }  // namespace kilvo

@@ -8,7 +8,7 @@
 #include "lab/simulation/simulator.hpp"
 
 namespace kilvo {
-namespace {
+namespace slow_legs_test {
 
 lab::SimulatorConfig slow_robot(std::uint64_t seed) {
   lab::SimulatorConfig config;
@@ -58,5 +58,5 @@ TEST(SlowLegs, AMetreAtAHundredHertzEndsWithinFiveCentimetres) {
   }
 }
 
-}  // namespace
+}  // namespace slow_legs_test
 }  // namespace kilvo

@@ -7,7 +7,7 @@
 #include "tests/live/lived.hpp"
 
 namespace kilvo {
-namespace {
+namespace level_test {
 
 constexpr double bias = 0.07, tilt = bias / 9.81;  // m/s^2, rad
 
@@ -94,5 +94,5 @@ TEST_F(LevelLive, CloudsAndGroundAreInTheSameWorld) {
   for (const GroundPatch& patch : last.contacts->ground) EXPECT_GT(patch.normal.z(), std::cos(0.01)) << "the floor is level";
 }
 
-}  // namespace
+}  // namespace level_test
 }  // namespace kilvo

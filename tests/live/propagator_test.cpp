@@ -11,7 +11,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo {
-namespace {
+namespace propagator_test {
 
 struct Legs {
   std::map<Time, Contacts> contacts;
@@ -79,5 +79,5 @@ TEST(LivePropagator, PairsALegSampleWithTheGyroOfItsOwnTime) {
                                     << sum / compared;
 }
 
-}  // namespace
+}  // namespace propagator_test
 }  // namespace kilvo

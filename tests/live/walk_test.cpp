@@ -9,7 +9,7 @@
 #include "tests/live/lived.hpp"
 
 namespace kilvo {
-namespace {
+namespace walk_test {
 
 using test::live_through;
 using test::Lived;
@@ -215,5 +215,5 @@ TEST(LiveWalk, WhatASinkThrowsEndsInStop) {
   EXPECT_EQ(calls, 1);
 }
 
-}  // namespace
+}  // namespace walk_test
 }  // namespace kilvo

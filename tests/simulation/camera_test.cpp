@@ -8,7 +8,7 @@
 #include "lab/simulation/description.hpp"
 
 namespace kilvo {
-namespace {
+namespace camera_test {
 
 /// The usual model, written once more: pinhole with radial and tangential distortion.
 Eigen::Vector2d pixel_of(const CameraMount& camera, const SE3& T_WI, const Eigen::Vector3d& p_W) {
@@ -86,5 +86,5 @@ TEST(WrittenCamera, EdgesAreWhereTheConfigurationSays) {
   EXPECT_GT(count, 200);
 }
 
-}  // namespace
+}  // namespace camera_test
 }  // namespace kilvo

@@ -9,7 +9,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo {
-namespace {
+namespace arrival_test {
 
 constexpr std::array<bool, sensor_count> liv = {true, false, true, true};
 constexpr double seconds = 7, full_rate = 30;  // of the walk; Hz, of the images that are simulated
@@ -161,5 +161,5 @@ TEST_F(Arrivals, HalfOfThemLostAtRandomCostNothingButThemselves) {
   EXPECT_EQ(d.disordered, 0);
 }
 
-}  // namespace
+}  // namespace arrival_test
 }  // namespace kilvo

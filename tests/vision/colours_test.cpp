@@ -9,7 +9,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo {
-namespace {
+namespace colours_test {
 
 // Where a point lies on a surface (its edges' coordinates, m), and how far from it.
 struct Place {
@@ -93,5 +93,5 @@ TEST(ColouredMap, IsAsBrightAsTheWorldWhereSurfacesAreFlatAndEven) {
   EXPECT_LT(std::abs(mean), 3) << "grey levels";
 }
 
-}  // namespace
+}  // namespace colours_test
 }  // namespace kilvo

@@ -15,7 +15,7 @@
 #include "tests/helpers/simulated.hpp"
 
 namespace kilvo {
-namespace {
+namespace images_test {
 
 using testing::HasSubstr;
 
@@ -285,5 +285,5 @@ TEST_F(Images, WithoutAnySweepAreDropped) {
   EXPECT_TRUE(d.outputs.contains(Modality::coast));
 }
 
-}  // namespace
+}  // namespace images_test
 }  // namespace kilvo
