@@ -43,13 +43,13 @@ build: configure-program
 	@cmake --build --preset release --target programs
 
 demo: configure-program
-	@echo "compiling the kilvo program: about five minutes on two cores"
+	@echo "compiling the kilvo program: three to five minutes on two cores"
 	@cmake --build --preset release --target kilvo_cli
 	@$(KILVO) demo
 	@if [ -n "$$DISPLAY$$WAYLAND_DISPLAY" ] && command -v xdg-open >/dev/null; then xdg-open demo/results/report.html; fi
 
 test: configure
-	@echo "compiling the programs, tests and benchmarks: about twenty minutes on two cores"
+	@echo "compiling the programs, tests and benchmarks: five to ten minutes on two cores"
 	cmake --build --preset release
 	ctest --preset release
 

@@ -1,8 +1,7 @@
-# kilvo_module(NAME [TESTS_TOGETHER] [UNIT files] [OPTIMIZATION level] [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
+# kilvo_module(NAME [UNIT files] [OPTIMIZATION level] [DEPENDS target...] [PRIVATE target...] [TEST_DEPENDS target...])
 #
 # One folder is one module is one CMake target, `kilvo_NAME` (alias `kilvo::NAME`): every *.cpp is compiled,
 # every *_test.cpp beside it goes into one test program `kilvo_NAME_test`. Every *.hpp compiles alone (scripts/check_headers).
-# TESTS_TOGETHER: its tests are compiled in one unit as well, where they are slow: their local names are all different.
 # What a module may include is listed in modules.txt and checked by scripts/check_modules.
 
 add_library(kilvo_flags INTERFACE)
@@ -23,15 +22,23 @@ endif()
 target_compile_definitions(kilvo_flags INTERFACE "KILVO_WIDE=${KILVO_WIDE}")
 
 # kilvo_optimization(TARGET [level]): of a release, where the target has no loop that counts: it compiles in three quarters of the time. The
-# results keep their bytes at any level.
+# results keep their bytes at any level. Comes before kilvo_precompile.
 function(kilvo_optimization target)
   if(ARGC GREATER 1)
     target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O${ARGV1}>)
+    set_target_properties(${target} PROPERTIES KILVO_OPTIMIZATION ${ARGV1})
   endif()
 endfunction()
 
+# kilvo_test(TARGET): how a program of tests is compiled. Each file of tests has a namespace of its own name, so that several make one unit.
+function(kilvo_test target)
+  kilvo_optimization(${target} 1)
+  kilvo_precompile(${target} TEST)
+  kilvo_unity(${target})
+endfunction()
+
 function(kilvo_module name)
-  cmake_parse_arguments(MODULE "TESTS_TOGETHER" "UNIT;OPTIMIZATION" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
+  cmake_parse_arguments(MODULE "" "UNIT;OPTIMIZATION" "DEPENDS;PRIVATE;TEST_DEPENDS" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
   file(GLOB tests CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_test.cpp)
   file(GLOB fuzzers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_fuzz.cpp)
@@ -64,10 +71,7 @@ function(kilvo_module name)
     add_executable(${target}_test ${tests})
     target_link_libraries(${target}_test PRIVATE ${target} kilvo_flags ${MODULE_PRIVATE} ${MODULE_TEST_DEPENDS} GTest::gmock GTest::gtest_main)
     target_compile_definitions(${target}_test PRIVATE KILVO_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-    kilvo_precompile(${target}_test TEST)
-    if(MODULE_TESTS_TOGETHER)
-      kilvo_unity(${target}_test)
-    endif()
+    kilvo_test(${target}_test)
     gtest_discover_tests(${target}_test TEST_PREFIX ${name}/ DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
   endif()
   if(fuzzers AND KILVO_BUILD_FUZZERS)
