@@ -30,7 +30,8 @@ function(kilvo_optimization target)
   endif()
 endfunction()
 
-# kilvo_test(TARGET): how a program of tests is compiled. Each file of tests has a namespace of its own name, so that several make one unit.
+# kilvo_test(TARGET): how a program of tests is compiled: what counts of its time is spent in the libraries. Each file of tests has a namespace
+# of its own name, so that several make one unit.
 function(kilvo_test target)
   kilvo_optimization(${target} 1)
   kilvo_precompile(${target} TEST)
