@@ -163,9 +163,10 @@ LegModel::Used Replay::apply(Estimate& e, const LegStep& step, Gain<LegModel::ma
   once.max_iterations = config_.legs.iterations;
   Gain<LegModel::max_leg_rows> own;
   Gain<LegModel::max_leg_rows>& gain = kept != nullptr ? *kept : own;
-  const Update done = update(e, model, once, nullptr, &gain);
+  Update done = update(e, model, once, nullptr, &gain);
   if (done.rows > 0) {
-    e = considered(e, done.posterior, gain);
+    consider(e.x, gain, done.posterior);
+    e = done.posterior;
   } else if (kept != nullptr) {
     *kept = {};
   }

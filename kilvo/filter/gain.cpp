@@ -38,13 +38,20 @@ struct Column {
 
 }  // namespace
 
-KILVO_WIDE void times_rows(const Covariance& P, const double* H, int rows, double* out) {
+KILVO_WIDE void project_rows(const Covariance& P, const double* H, int rows, double* S, double* W) {
   for (int i = 0; i < rows; ++i) {
-    Column c{};
+    const double* h = H + i * at::size;
+    int touched[at::size], count = 0;
+    Column w{};
     for (int j = 0; j < at::size; ++j) {
-      if (const double h = H[i * at::size + j]; h != 0) add(c, h, P.data() + j * at::size);
+      if (h[j] == 0) continue;
+      touched[count++] = j;
+      add(w, h[j], P.data() + j * at::size);
     }
-    write(c, out + i * at::size);
+    write(w, W + i * at::size);
+    for (int k = 0; k <= i; ++k) {
+      for (int n = 0; n < count; ++n) S[k * rows + i] += h[touched[n]] * W[k * at::size + touched[n]];
+    }
   }
 }
 

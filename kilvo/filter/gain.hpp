@@ -12,8 +12,8 @@
 
 namespace kilvo {
 
-/// Column i of `out` (at::size by `rows`) becomes P times row i of `H` (`rows` by at::size, row-major), whose zeros cost nothing.
-void times_rows(const Covariance& P, const double* H, int rows, double* out);
+/// W = P H' and the lower triangle of S += H W; of H (`rows` by at::size, row-major) zeros cost nothing. W and S are column-major.
+void project_rows(const Covariance& P, const double* H, int rows, double* S, double* W);
 
 /// How many rows a model may return.
 template <class Model>
@@ -65,16 +65,9 @@ void reduce(const Covariance& P, const double* W, int rows, Covariance& out);
 
 template <int Max>
 void Gain<Max>::project(const Covariance& P, const Rows<Max>& rows) {
-  const auto count = rows.r.size();
-  W_.resize(at::size, count);
+  W_.resize(at::size, rows.r.size());
   S_ = rows.R;
-  times_rows(P, rows.H.data(), static_cast<int>(count), W_.data());
-  for (Eigen::Index i = 0; i < count; ++i) {
-    for (Eigen::Index j = 0; j < at::size; ++j) {
-      if (rows.H(i, j) == 0) continue;
-      for (Eigen::Index k = 0; k <= i; ++k) S_(i, k) += rows.H(i, j) * W_(j, k);
-    }
-  }
+  project_rows(P, rows.H.data(), static_cast<int>(rows.r.size()), S_.data(), W_.data());
 }
 
 template <int Max>

@@ -1,6 +1,5 @@
 #include "kilvo/filter/predict.hpp"
 
-#include <array>
 #include <cassert>
 
 #include "kilvo/filter/gain.hpp"
@@ -60,16 +59,10 @@ using MovingRows = Eigen::Matrix<double, moving, at::size, Eigen::RowMajor>;
 // P becomes F P F', where F is the identity below its first rows. Each row of F P is a sum of columns of P, which is symmetric.
 void move(const MovingRows& F, Covariance& P) {
   Eigen::Matrix<double, at::size, moving> out;
-  times_rows(P, F.data(), moving, out.data());
-  std::array<double, static_cast<std::size_t>(moving * moving)> N{};  // F P F' of those rows
+  Eigen::Matrix<double, moving, moving> N = Eigen::Matrix<double, moving, moving>::Zero();  // F P F' of those rows
+  project_rows(P, F.data(), moving, N.data(), out.data());
   for (int k = 0; k < moving; ++k) {
-    for (int j = 0; j < at::size; ++j) {
-      if (F(k, j) == 0) continue;
-      for (int i = 0; i <= k; ++i) N[static_cast<std::size_t>(k * moving + i)] += F(k, j) * out(j, i);
-    }
-  }
-  for (int k = 0; k < moving; ++k) {
-    for (int i = 0; i <= k; ++i) P(i, k) = P(k, i) = N[static_cast<std::size_t>(k * moving + i)];
+    for (int i = 0; i <= k; ++i) P(i, k) = P(k, i) = N(k, i);
     for (int j = moving; j < at::size; ++j) P(k, j) = P(j, k) = out(j, k);
   }
 }

@@ -48,7 +48,6 @@ Update detail::iterate(const Estimate& prior, ModelView<Max> model, const Update
     const ErrorVector d = gain.step(rows, e);
 
     x = boxplus(x, d);
-    e = boxminus(x, prior.x);
     out.iterations = k;
     out.rows = static_cast<int>(count);
     out.converged = k >= config.min_iterations && d.segment<3>(at::R).norm() < config.rotation_step &&
@@ -57,6 +56,7 @@ Update detail::iterate(const Estimate& prior, ModelView<Max> model, const Update
       gain.reduce(P, out.posterior.P);
       break;
     }
+    e = boxminus(x, prior.x);
   }
   out.posterior.x = x;
   return out;

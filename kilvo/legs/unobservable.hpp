@@ -17,13 +17,12 @@ Heading heading_of(const State& x);
 /// A step of the error state that leaves those as they are.
 inline ErrorVector without(const Heading& h, const ErrorVector& d) { return d - h * (h.transpose() * d); }
 
-/// From a prior and its posterior by the gain (P H' L^-T in W): the posterior of an update that leaves them as they are, but knows how all
-/// else goes with them (Schmidt's consider states: (I - K H) P (I - K H)' + K R K' with these rows of K zero).
+/// Makes a posterior by the gain (P H' L^-T in W) that of an update that leaves them as they are, but knows how all else goes with them
+/// (Schmidt's consider states: (I - K H) P (I - K H)' + K R K' with these rows of K zero).
 template <int Max>
-Estimate considered(const Estimate& prior, const Estimate& posterior, const Gain<Max>& gain) {
-  const Heading h = heading_of(prior.x);
-  Estimate out = posterior;
-  out.x = boxplus(prior.x, without(h, boxminus(posterior.x, prior.x)));
+void consider(const State& prior, const Gain<Max>& gain, Estimate& posterior) {
+  const Heading h = heading_of(prior);
+  posterior.x = boxplus(prior, without(h, boxminus(posterior.x, prior)));
   // h W W' h' = h (share share') h'. Each column of h has one block of three that is not zero, the same in both.
   const Eigen::Vector3d up_I = h.block<3, 1>(at::R, 0);
   double turn = 0, both = 0, bias = 0;
@@ -34,11 +33,10 @@ Estimate considered(const Estimate& prior, const Estimate& posterior, const Gain
     bias += b * b;
   }
   const Eigen::Matrix3d along = up_I * up_I.transpose();
-  out.P.block<3, 3>(at::R, at::R) += turn * along;
-  out.P.block<3, 3>(at::R, at::bg) += both * along;
-  out.P.block<3, 3>(at::bg, at::R) += both * along;
-  out.P.block<3, 3>(at::bg, at::bg) += bias * along;
-  return out;
+  posterior.P.block<3, 3>(at::R, at::R) += turn * along;
+  posterior.P.block<3, 3>(at::R, at::bg) += both * along;
+  posterior.P.block<3, 3>(at::bg, at::R) += both * along;
+  posterior.P.block<3, 3>(at::bg, at::bg) += bias * along;
 }
 
 /// Two feet that stand see how the body turns: the rest of what the gyro says is bias.
