@@ -1,6 +1,7 @@
 #include "kilvo/legs/joint_chain.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <console_bridge/console.h>
 #include <kdl/tree.hpp>
 #include <stdexcept>
@@ -78,7 +79,7 @@ void pass(const ChainJoint& joint, double q, double dq, MovingFrame& frame) {
     frame.v += frame.omega.cross(q * axis) + dq * axis;
   }
   if (joint.turns) frame.omega += dq * axis;
-  frame.R = (frame.R * (joint.turns ? Eigen::Matrix3d(SO3::Exp(q * joint.axis).matrix() * joint.R) : joint.R)).eval();
+  frame.R = (frame.R * (joint.turns ? joint.R + std::sin(q) * joint.sine + (1 - std::cos(q)) * joint.versine : joint.R)).eval();
 }
 
 }  // namespace
@@ -114,6 +115,8 @@ JointChain LinkTree::chain(const std::string& from, const std::string& to) const
     next.p += next.R * origin;
     next.axis = next.R * to_eigen(joint.JointAxis());
     next.R = (next.R * turned).eval();
+    next.sine = skew(next.axis) * next.R;
+    next.versine = skew(next.axis) * next.sine;
     if (!moves) continue;
     out.names.push_back(joint.getName());
     out.joints.push_back(next);

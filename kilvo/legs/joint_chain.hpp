@@ -11,11 +11,12 @@
 
 namespace kilvo {
 
-/// A joint and the rigid parts before it, in the frame of the joint before; R: how the frame behind it is turned when it is at zero.
+/// A joint and the rigid parts before it, in the frame of the joint before. The frame behind it is turned by R when it is at zero, and a
+/// joint that turns by q makes that R + sin(q) sine + (1 - cos(q)) versine (Rodrigues).
 struct ChainJoint {
   bool turns = false, slides = false;  // neither: the rigid end of the chain
   Eigen::Vector3d axis = Eigen::Vector3d::Zero(), p = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity(), sine = Eigen::Matrix3d::Zero(), versine = Eigen::Matrix3d::Zero();
 };
 
 /// A frame that moves, as the first link of a chain sees it.

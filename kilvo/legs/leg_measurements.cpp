@@ -141,8 +141,11 @@ void move_stance(Estimate& e, std::size_t side, const Stance& foot) {
   const int pc = at::pcl + 3 * static_cast<int>(side);
   const Eigen::Matrix3d J = -e.x.R.matrix() * skew(foot.shift);
   e.x.pc[side] += e.x.R * foot.shift;
-  e.P.middleRows<3>(pc) += (J * e.P.middleRows<3>(at::R)).eval();
-  e.P.middleCols<3>(pc) += (e.P.middleCols<3>(at::R) * J.transpose()).eval();
+  // The rows first, which are the columns of a symmetric matrix; then the columns, by rows that have moved.
+  Eigen::Matrix<double, at::size, 3> moved = e.P.middleCols<3>(at::R) * J.transpose();
+  e.P.middleRows<3>(pc) += moved.transpose();
+  moved.middleRows<3>(pc) = e.P.block<3, 3>(pc, at::R) * J.transpose();
+  e.P.middleCols<3>(pc) += moved;
   e.P.block<2, 2>(pc, pc).diagonal().array() += foot.settled2;
 }
 
