@@ -25,7 +25,7 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       imu_(robot.imu, config.initial),
       history_(config),
       legs_(config.legs),
-      lidar_(robot.lidar, config.lidar, config.update, config.noise, config.threads),
+      lidar_(robot.lidar, config.lidar, config.update, config.threads),
       map_(config.map, config.lidar, robot.lidar.T_imu_lidar.p),
       frames_(robot.lidar.rate, input_.uses(Sensor::lidar), config.lidar.recut && input_.uses(Sensor::camera)),
       status_(robot, input_.uses(Sensor::lidar), config.settling) {

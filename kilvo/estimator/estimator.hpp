@@ -34,8 +34,7 @@ class Estimator {
   /// no sense (its name is in the text).
   Estimator(const Robot& robot, const EstimatorConfig& config, std::array<bool, sensor_count> used);
 
-  /// The surroundings are known: sweeps are registered to this map, in the estimator's world, and leave it as it is. Before the first
-  /// push.
+  /// The surroundings are known: sweeps are registered to this map, in the estimator's world, and leave it as it is. Before any push.
   void give_map(VoxelMap map) { map_.give(std::move(map)); }
 
   /// Takes a measurement in the order of its arrival; returns what became known, in time order.

@@ -35,8 +35,7 @@ class LivePropagator {
   /// Measurements of earlier stamps are of no use to it.
   Time known() const { return history_.closed().t; }
 
-  /// Goes on from the estimator's present state; `common_error`: what its covariance lacks. Allocates only
-  /// when it has never held so much.
+  /// Goes on from the estimator's present state; `common_error`: what its covariance lacks. Allocates only when it never held so much.
   void become(const History& history, const LegPipeline& legs, const ImuWatch& imu, const SensorStatus& status,
               const PoseCovariance& common_error, std::uint32_t epoch);
 

@@ -78,6 +78,17 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   return interval;
 }
 
+ProcessNoise Replay::noise_within(Time begin, Time end) const {
+  double more = 0;
+  for (std::size_t i = 1; i < imu_.size(); ++i) {
+    const Time from = std::max(begin, imu_[i - 1].t), to = std::min(end, imu_[i].t);
+    if (from < to) more += to_seconds(to - from) * (interval_between(imu_[i - 1], imu_[i], from, to, {}).gyro_scale - 1);
+  }
+  ProcessNoise out = config_.noise;
+  out.gyro *= std::sqrt(1 + more / to_seconds(end - begin));
+  return out;
+}
+
 FootOrientations Replay::standing_at(Time t) const {
   FootOrientations out;
   const auto after = std::upper_bound(steps_.begin(), steps_.end(), t, [](Time value, const LegStep& s) { return value < s.t; });

@@ -26,6 +26,8 @@ class Replay {
 
   /// The IMU was silent within [begin, end], for so long that nothing is known of the motion.
   bool is_blind(Time begin, Time end) const;
+  /// The noise of the settings, with that of the gyroscope as large as gaps, clipping and jumps within [begin, end] make it.
+  ProcessNoise noise_within(Time begin, Time end) const;
 
   /// What the gyroscope said, rad/s; none within a gap.
   std::optional<Eigen::Vector3d> gyro_at(Time t) const;

@@ -252,6 +252,26 @@ TEST(Replay, AcrossAGapOfTheImuTheCovarianceSaysThatNobodyLooked) {
   EXPECT_GT(after_gap(milliseconds(500)), after_gap(milliseconds(120)));
 }
 
+// A sweep whose points were taken along while the IMU was silent is as uncertain as the prediction over that time.
+TEST(Replay, WithinAGapTheNoiseIsThatOfThePredictionOverIt) {
+  Replay replay{EstimatorConfig{}};
+  for (Duration t{}; t <= milliseconds(400); t += milliseconds(5)) {
+    if (t <= milliseconds(200) || t >= milliseconds(280)) replay.add(imu_at(t));
+  }
+  const auto gyro_within = [&](int from, int to) {
+    return replay.noise_within(begin_time + milliseconds(from), begin_time + milliseconds(to)).gyro;
+  };
+  EXPECT_EQ(gyro_within(100, 200), ProcessNoise{}.gyro);
+  EXPECT_EQ(gyro_within(280, 380), ProcessNoise{}.gyro);
+  Estimate e = start();
+  e.t = begin_time + milliseconds(190);
+  e.P.setZero();
+  replay.predict_to(e, begin_time + milliseconds(290), nullptr);
+  const double grown = e.P.block<3, 3>(at::R, at::R).trace() / 3, within = gyro_within(190, 290);
+  EXPECT_GT(grown, 100 * 0.1 * ProcessNoise{}.gyro * ProcessNoise{}.gyro);
+  EXPECT_NEAR(0.1 * within * within / grown, 1, 0.03);
+}
+
 // A robot at rest, whose biases are the means of what an IMU with noise said: at the end of that time it has neither turned nor got under
 // way, whatever the noise was, and its covariance says so. From then on it grows.
 TEST(Replay, WhileTheBiasesWereTakenNoiseAddsNothing) {

@@ -24,7 +24,8 @@ void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservab
 Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, History& history, Estimate& prior,
                                       PointDrops& drops) const {
   const PoseCovariance error = error_at(prior.x.pose());
-  Registration sweep = lidar.measure(scan, end, prior, history.trajectory(), surfaces_, error, drops);
+  const ProcessNoise noise = history.replay().noise_within(prior.t - (end - prior.t), end);
+  Registration sweep = lidar.measure(scan, end, prior, history.trajectory(), noise, surfaces_, error, drops);
   const bool is_surprised = lidar.is_surprised(prior, sweep, error);
   if ((sweep.refused != Reason::fits_nowhere && !is_surprised) || (sweep.refused && !sweep.searched)) return sweep;
   auto doubted = history.doubted(prior.t, end, sweep.refused ? std::nullopt : std::optional((sweep.posterior.x.p - prior.x.p).norm()));
@@ -33,7 +34,7 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& sca
   doubted->record_from(expected, end);
   PointDrops counted;
   const PoseCovariance error_there = error_at(expected.x.pose());
-  Registration again = lidar.measure(scan, end, expected, doubted->trajectory(), surfaces_, error_there, counted);
+  Registration again = lidar.measure(scan, end, expected, doubted->trajectory(), noise, surfaces_, error_there, counted);
   if (again.refused || !again.carries || (!sweep.refused && !LidarPipeline::agrees(expected, again, error_there))) return sweep;
   history = std::move(*doubted);
   prior = expected;

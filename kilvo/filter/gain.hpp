@@ -19,6 +19,13 @@ void project_rows(const Covariance& P, const double* H, int rows, double* S, dou
 template <class Model>
 inline constexpr int most_rows_of = std::remove_cvref_t<std::invoke_result_t<Model, const State&, const Covariance&>>::most;
 
+namespace detail {
+/// S (`rows` by `rows`, column-major): its lower triangle becomes L, and the columns of W those of W L^-T.
+bool factor(double* S, int rows, double* W, double* inverse);
+/// out = P - W W'
+void reduce(const Covariance& P, const double* W, int rows, Covariance& out);
+}  // namespace detail
+
 /// S = H P H' + R = L L', W = P H' L^-T: the gain is W L^-1 and the posterior covariance P - W W', symmetric by construction.
 template <int Max>
 class Gain {
@@ -34,7 +41,7 @@ class Gain {
   Square& S() { return S_; }
 
   /// From P H' to W, from S to L. False when S is not positive definite.
-  bool factor();
+  bool factor() { return detail::factor(S_.data(), static_cast<int>(S_.rows()), W_.data(), inverse_.data()); }
 
   /// The step from an iterate at prior [+] e.
   ErrorVector step(const Rows<Max>& rows, const ErrorVector& e) const;
@@ -45,7 +52,7 @@ class Gain {
   }
 
   /// The covariance after the step.
-  void reduce(const Covariance& P, Covariance& out) const;
+  void reduce(const Covariance& P, Covariance& out) const { detail::reduce(P, W_.data(), static_cast<int>(W_.cols()), out); }
 
  private:
   template <class Known>
@@ -56,23 +63,11 @@ class Gain {
   std::array<double, static_cast<std::size_t>(Max)> inverse_{};  // of the diagonal of L
 };
 
-namespace detail {
-/// S (`rows` by `rows`, column-major): its lower triangle becomes L, and the columns of W those of W L^-T.
-bool factor(double* S, int rows, double* W, double* inverse);
-/// out = P - W W'
-void reduce(const Covariance& P, const double* W, int rows, Covariance& out);
-}  // namespace detail
-
 template <int Max>
 void Gain<Max>::project(const Covariance& P, const Rows<Max>& rows) {
   W_.resize(at::size, rows.r.size());
   S_ = rows.R;
   project_rows(P, rows.H.data(), static_cast<int>(rows.r.size()), S_.data(), W_.data());
-}
-
-template <int Max>
-bool Gain<Max>::factor() {
-  return detail::factor(S_.data(), static_cast<int>(S_.rows()), W_.data(), inverse_.data());
 }
 
 template <int Max>
@@ -93,11 +88,6 @@ ErrorVector Gain<Max>::step(const Residual<Max>& r, Known&& known) const {
     d -= v * W_.col(i);
   }
   return d;
-}
-
-template <int Max>
-void Gain<Max>::reduce(const Covariance& P, Covariance& out) const {
-  detail::reduce(P, W_.data(), static_cast<int>(W_.cols()), out);
 }
 
 }  // namespace kilvo

@@ -52,9 +52,8 @@ bool contradicts_map(const RegistrationReport& report) {
 
 }  // namespace
 
-LidarPipeline::LidarPipeline(const LidarMount& mount, const LidarConfig& config, const UpdateConfig& update, const ProcessNoise& noise,
-                             int threads)
-    : mount_(mount), config_(config), update_(update), noise_(noise), workers_(threads) {}
+LidarPipeline::LidarPipeline(const LidarMount& mount, const LidarConfig& config, const UpdateConfig& update, int threads)
+    : mount_(mount), config_(config), update_(update), workers_(threads) {}
 
 bool LidarPipeline::has_shape(Time end, const Estimate& prior) const {
   return end >= begins_at_ || prior.P.diagonal().segment<3>(at::v).maxCoeff() <= known_velocity * known_velocity;
@@ -65,7 +64,7 @@ void LidarPipeline::note_silence(Duration silence) {
 }
 
 Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory,
-                                    const VoxelMap& map, const PoseCovariance& map_error, PointDrops& drops) {
+                                    const ProcessNoise& noise, const VoxelMap& map, const PoseCovariance& map_error, PointDrops& drops) {
   Registration out;
   out.posterior = prior;
   out.points = undistort(scan, trajectory, prior.t, mount_, drops);
@@ -85,7 +84,7 @@ Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estim
   if (map.empty()) {
     out.carries = true;
   } else {
-    const UndistortionNoise within_scan = undistortion_noise(noise_, end - prior.t);
+    const UndistortionNoise within_scan = undistortion_noise(noise, end - prior.t);
     out.searched = needs_search(prior.P, PoseCovariance::Identity() - unknowable_);
     if (out.searched) {
       search(map, prior, model, within_scan, out);

@@ -39,7 +39,7 @@ struct Registration {
 
 class LidarPipeline {
  public:
-  LidarPipeline(const LidarMount& mount, const LidarConfig& config, const UpdateConfig& update, const ProcessNoise& noise, int threads);
+  LidarPipeline(const LidarMount& mount, const LidarConfig& config, const UpdateConfig& update, int threads);
 
   /// The first pose is T_WI. Sweeps that end before `t` are used only when the velocity is known: one of an unknown velocity has no shape,
   /// and along a corridor nothing would show it.
@@ -52,10 +52,10 @@ class LidarPipeline {
   /// A sweep begins so long after the last one that was used.
   void note_silence(Duration silence);
 
-  /// `scan` lasts until `end`. `prior`: at the scan's middle. `trajectory`: covers the scan. `map_error`: of the map around the prior. An
-  /// empty map takes the sweep as it is. `drops`: counts the points that are not used.
-  Registration measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory, const VoxelMap& map,
-                       const PoseCovariance& map_error, PointDrops& drops);
+  /// `scan` lasts until `end`. `prior`: at the scan's middle. `trajectory`: covers the scan, with the IMU's `noise`. `map_error`: of the
+  /// map around the prior. An empty map takes the sweep as it is. `drops`: counts the points that are not used.
+  Registration measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory, const ProcessNoise& noise,
+                       const VoxelMap& map, const PoseCovariance& map_error, PointDrops& drops);
 
   /// The sweep was registered much farther from `prior` than the covariance says and than sweeps usually are, and those before it were not.
   /// `map_error`: of the map around the prior.
@@ -99,7 +99,6 @@ class LidarPipeline {
   LidarMount mount_;
   LidarConfig config_;
   UpdateConfig update_;
-  ProcessNoise noise_;
   Workers workers_;
   Time begins_at_{};
   TimeOffset time_offset_;

@@ -30,7 +30,7 @@ struct Standing {
   Trajectory trajectory{std::chrono::seconds(1)};
   LidarPipeline pipeline;
 
-  Standing() : mount(mounted()), pipeline(mount, LidarConfig{}, UpdateConfig{}, ProcessNoise{}, 1) {
+  Standing() : mount(mounted()), pipeline(mount, LidarConfig{}, UpdateConfig{}, 1) {
     while (auto m = room.next()) {
       if (const auto* s = std::get_if<LidarScan>(&*m)) {
         scan = *s;
@@ -59,7 +59,7 @@ struct Standing {
   }
   Registration measured(const VoxelMap& map, const Estimate& prior) {
     PointDrops drops;
-    return pipeline.measure(scan, end, prior, trajectory, map, no_error(), drops);
+    return pipeline.measure(scan, end, prior, trajectory, ProcessNoise{}, map, no_error(), drops);
   }
   VoxelMap whole() const { return test::exact_map(room.surfaces(), SE3()); }
 };
@@ -121,7 +121,7 @@ TEST(LidarPipeline, AnEmptyMapTakesTheSweepAsItIs) {
 }
 
 TEST(LidarPipeline, SweepsThatFitNowhereForTwoSecondsBeginTheMapAnew) {
-  LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, ProcessNoise{}, 1);
+  LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, 1);
   for (int tenth = 0; tenth < 20; ++tenth) EXPECT_FALSE(pipeline.refuse(early + tenth * milliseconds(100), false)) << tenth;
   EXPECT_TRUE(pipeline.is_rejoining());
   EXPECT_TRUE(pipeline.refuse(early + milliseconds(2000), false));
@@ -131,8 +131,8 @@ TEST(LidarPipeline, SweepsThatFitNowhereForTwoSecondsBeginTheMapAnew) {
 }
 
 TEST(LidarPipeline, AnAcceptedSweepInBetweenOrAGivenMapLeavesItAsItIs) {
-  LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, ProcessNoise{}, 1);
-  LidarPipeline given(LidarMount{}, LidarConfig{}, UpdateConfig{}, ProcessNoise{}, 1);
+  LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, 1);
+  LidarPipeline given(LidarMount{}, LidarConfig{}, UpdateConfig{}, 1);
   Registration fits;
   fits.carries = true;
   for (int tenth = 0; tenth < 100; ++tenth) {
@@ -162,7 +162,7 @@ Estimate known_to_a_centimetre() {
 }
 
 TEST(LidarPipeline, AfterAnOutageTheMapGrowsOnceThreeSweepsInARowAgree) {
-  LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, ProcessNoise{}, 1);
+  LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, 1);
   const Estimate prior = known_to_a_centimetre();
   EXPECT_TRUE(pipeline.may_learn(prior, agreeing(prior, 10, 1), no_error())) << "nothing is to be joined";
   pipeline.rejoin();
@@ -180,7 +180,7 @@ TEST(LidarPipeline, AfterAnOutageTheMapGrowsOnceThreeSweepsInARowAgree) {
 }
 
 TEST(LidarPipeline, WhereTheMapIsNotTheSweepIsLearntButProvesNothing) {
-  LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, ProcessNoise{}, 1);
+  LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, 1);
   const Estimate prior = known_to_a_centimetre();
   pipeline.rejoin();
   Registration elsewhere = agreeing(prior, 10, 0);
@@ -194,7 +194,7 @@ TEST(LidarPipeline, TheErrorOfTheMapIsNoContradiction) {
   PoseCovariance of_map = PoseCovariance::Zero();
   for (const double sigma : {0.0, 0.05}) {
     of_map.diagonal().setConstant(sigma * sigma);
-    LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, ProcessNoise{}, 1);
+    LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, 1);
     pipeline.rejoin();
     for (int i = 0; i < 3; ++i) pipeline.may_learn(prior, agreeing(prior, 80, 0.1), of_map);
     EXPECT_EQ(pipeline.is_rejoining(), sigma == 0);
@@ -202,7 +202,7 @@ TEST(LidarPipeline, TheErrorOfTheMapIsNoContradiction) {
 }
 
 TEST(LidarPipeline, AfterThreePeriodsOfSilenceTheMapIsJoinedAgain) {
-  LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, ProcessNoise{}, 1);
+  LidarPipeline pipeline(LidarMount{}, LidarConfig{}, UpdateConfig{}, 1);
   pipeline.note_silence(milliseconds(300));
   EXPECT_FALSE(pipeline.is_rejoining());
   pipeline.note_silence(milliseconds(301));

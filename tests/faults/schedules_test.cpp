@@ -50,7 +50,7 @@ std::string words(const std::vector<Failure>& failures) {
 
 TEST(Schedules, OfRandomFailuresAreOutlived) {
   const char* text = std::getenv("KILVO_SCHEDULES");
-  const int count = text != nullptr ? std::atoi(text) : 12;
+  const int count = text != nullptr ? std::atoi(text) : 17;
   const char* first_text = std::getenv("KILVO_FIRST_SCHEDULE");
   const int first = first_text != nullptr ? std::atoi(first_text) : 1;
   const test::FailingWalk walk("room", 3, seconds, true);
