@@ -11,7 +11,7 @@ struct LidarConfig {
   double range_noise = 0.02;   // m
   double angle_noise = 0.001;  // rad
   double voxel_size = 0.25;    // m
-  double gate = 4.0;
+  double gate = 3.0;
   double weak_share = 0.002;
   double least_ratio = 0;
   bool recut = false;
