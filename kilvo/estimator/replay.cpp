@@ -85,7 +85,7 @@ ProcessNoise Replay::noise_within(Time begin, Time end) const {
     if (from < to) more += to_seconds(to - from) * (interval_between(imu_[i - 1], imu_[i], from, to, {}).gyro_scale - 1);
   }
   ProcessNoise out = config_.noise;
-  out.gyro *= std::sqrt(1 + more / to_seconds(end - begin));
+  if (more > 0) out.gyro *= std::sqrt(1 + more / to_seconds(end - begin));
   return out;
 }
 

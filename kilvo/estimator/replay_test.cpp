@@ -262,6 +262,7 @@ TEST(Replay, WithinAGapTheNoiseIsThatOfThePredictionOverIt) {
     return replay.noise_within(begin_time + milliseconds(from), begin_time + milliseconds(to)).gyro;
   };
   EXPECT_EQ(gyro_within(100, 200), ProcessNoise{}.gyro);
+  EXPECT_EQ(gyro_within(250, 250), ProcessNoise{}.gyro);  // a sweep whose points were measured at once
   EXPECT_EQ(gyro_within(280, 380), ProcessNoise{}.gyro);
   Estimate e = start();
   e.t = begin_time + milliseconds(190);
