@@ -22,7 +22,7 @@ int check(const ConfigOptions& options) {
   const lab::Settings settings = lab::load_settings(options.file, options.overrides);
   std::vector<Sensor> configured;
   std::string names;
-  for (const Sensor sensor : every_sensor) {
+  for (const Sensor sensor : all_sensors) {
     if (!settings.has(sensor)) continue;
     configured.push_back(sensor);
     names += fmt::format("{}{} ({})", names.empty() ? "" : ", ", name_of(sensor), settings.topic(sensor));

@@ -66,7 +66,7 @@ lab::OutputFormat format_of(const fs::path& out, const ConvertWords& words) {
 /// The topics of the sensors in a configuration; of the camera the compressed ones too.
 void add_topics_of(const std::string& config, const lab::RecordingReader& recording, std::set<std::string>& topics) {
   const lab::Settings settings = lab::load_settings(config);
-  for (const Sensor sensor : every_sensor) {
+  for (const Sensor sensor : all_sensors) {
     if (!settings.has(sensor)) continue;
     for (const auto& [id, channel] : recording.connections()) {
       if (lab::topic_matches(sensor, settings.topic(sensor), channel.topic)) topics.insert(channel.topic);

@@ -8,6 +8,7 @@
 
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/output_folder.hpp"
+#include "apps/cli/recording_options.hpp"
 #include "apps/cli/sensor_choice.hpp"
 #include "apps/cli/shipped_config.hpp"
 #include "apps/cli/verbs.hpp"
@@ -30,23 +31,9 @@ struct DoctorOptions {
   bool json = false;
 };
 
-lab::RecordingOptions recording_options(const DoctorOptions& options, const lab::Settings& settings, const std::vector<Sensor>& used) {
-  const Robot& robot = settings.robot;
-  const double rates[] = {robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate};
-  const double offsets[] = {robot.imu.time_offset, robot.legs.time_offset, robot.lidar.time_offset, robot.camera.time_offset};
-  lab::RecordingOptions out;
-  out.start = options.start;
-  out.duration = options.duration;
-  const bool with_legs = std::ranges::find(used, Sensor::legs) != used.end();
-  if (with_legs && settings.leg_clock.clock != "stamp") out.leg_clock.emplace(settings.leg_clock, robot);
-  for (const Sensor sensor : used) {
-    const auto i = static_cast<std::size_t>(sensor);
-    out[sensor] = {true, settings.topic(sensor), rates[i], offsets[i]};
-  }
-  return out;
-}
-
 lab::Recorded record(const DoctorOptions& options, lab::RecordingOptions wanted) {
+  wanted.start = options.start;
+  wanted.duration = options.duration;
   const auto read = [&options](const lab::RecordingOptions& what) {
     lab::RecordingSource source(options.input, what);
     lab::Recorder recorder(what.leg_clock.has_value());
@@ -99,7 +86,7 @@ Judged judge(const DoctorOptions& options) {
   const SensorChoice choice = choose_sensors(std::nullopt, settings, config.string(), {options.input});
   for (const std::string& text : choice.warnings) fmt::print(stderr, "kilvo: warning: {}\n", text);
   fmt::print(stderr, "kilvo: looking at {:.0f} s of {}\n", options.duration, options.input);
-  const lab::Recorded recorded = record(options, recording_options(options, settings, choice.used));
+  const lab::Recorded recorded = record(options, recording_options(settings, choice.used));
   lab::Examination examination(recorded, settings.robot);
   lab::Diagnosis diagnosis = examination.run();
   return {config, settings, std::move(diagnosis), examination.refinements()};

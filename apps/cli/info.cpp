@@ -70,7 +70,7 @@ std::vector<std::string> best_names(const InfoOptions& options, lab::RecordingOp
   const auto found = [&](const std::vector<std::string>& names) {
     return std::ranges::count_if(names, [&](const std::string& name) { return joints.contains(name); });
   };
-  for (const Sensor sensor : every_sensor) wanted[sensor].use = sensor == Sensor::legs;
+  for (const Sensor sensor : all_sensors) wanted[sensor].use = sensor == Sensor::legs;
   std::vector<std::string> best;
   try {
     lab::RecordingSource source(options.paths(), wanted);
@@ -108,7 +108,7 @@ int info(const InfoOptions& options) {
   const auto config = config_file(options.config.empty() ? std::nullopt : std::optional(options.config), options.inputs.front());
   const lab::Settings settings = lab::load_settings(config);
   lab::RecordingOptions wanted;
-  for (const Sensor sensor : every_sensor) {
+  for (const Sensor sensor : all_sensors) {
     wanted[sensor].use = settings.has(sensor);
     wanted[sensor].topic = settings.topic(sensor);
   }

@@ -7,6 +7,9 @@
 
 namespace kilvo::cli {
 
+/// All of it.
+lab::RecordingOptions recording_options(const lab::Settings& settings, const std::vector<Sensor>& used);
+/// What is asked for.
 lab::RecordingOptions recording_options(const RunOptions& options, const lab::Settings& settings, const std::vector<Sensor>& used);
 
 }  // namespace kilvo::cli

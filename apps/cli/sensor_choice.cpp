@@ -21,7 +21,7 @@ namespace {
 
 Sensor parse_sensor(const std::string& name) {
   std::vector<std::string> names;
-  for (const Sensor sensor : every_sensor) {
+  for (const Sensor sensor : all_sensors) {
     names.emplace_back(name_of(sensor));
     if (name == names.back()) return sensor;
   }
@@ -61,7 +61,7 @@ std::optional<std::string> unnamed_topic(Sensor sensor, const lab::Settings& set
   for (const auto& entry : recording.connections()) {
     const lab::Channel& connection = entry.second;
     if (!lab::is_type_of(sensor, connection.type)) continue;
-    const bool named = std::ranges::any_of(every_sensor, [&](Sensor other) {
+    const bool named = std::ranges::any_of(all_sensors, [&](Sensor other) {
       return settings.has(other) && lab::topic_matches(other, settings.topic(other), connection.topic);
     });
     if (!named) return connection.topic;
@@ -166,7 +166,7 @@ SensorChoice choose_sensors(const std::optional<std::vector<Sensor>>& wanted, co
   bool any_present = false, more_configured = false;
   std::vector<std::string> missing;
   std::vector<Sensor> absent;
-  for (const Sensor sensor : every_sensor) {
+  for (const Sensor sensor : all_sensors) {
     if (!settings.has(sensor)) continue;
     const std::string& pattern = settings.topic(sensor);
     const bool present = std::ranges::any_of(topics, [&](const std::string& topic) { return lab::topic_matches(sensor, pattern, topic); });

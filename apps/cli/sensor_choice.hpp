@@ -12,8 +12,6 @@
 
 namespace kilvo::cli {
 
-inline constexpr std::array<Sensor, sensor_count> every_sensor{Sensor::imu, Sensor::legs, Sensor::lidar, Sensor::camera};
-
 /// "imu,lidar" -> sensors. Throws UsageError, naming the nearest, for an unknown one.
 std::vector<Sensor> parse_sensors(const std::string& list);
 

@@ -72,8 +72,7 @@ bool wants_exclusive(const dds_qos_t* qos) {
 }  // namespace
 
 DdsInputs::DdsInputs(const Domain& domain, const lab::Settings& settings, node::SensorInputs& inputs) : domain_(domain), inputs_(inputs) {
-  for (int i = 0; i < sensor_count; ++i) {
-    const auto sensor = static_cast<Sensor>(i);
+  for (const Sensor sensor : all_sensors) {
     if (!settings.has(sensor)) continue;
     const std::string topic = dds_topic(settings.topic(sensor));
     subscribe(sensor, topic, false);

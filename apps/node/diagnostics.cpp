@@ -165,8 +165,8 @@ std::optional<double> silence_of(const InputState& input, double rate, SteadyClo
 
 std::vector<DiagnosticStatus> statuses(const Condition& condition) {
   std::vector<DiagnosticStatus> out = {status_of_estimate(condition)};
-  for (int i = 0; i < sensor_count; ++i) {
-    if (!condition.inputs[static_cast<std::size_t>(i)].topic.empty()) out.push_back(status_of(static_cast<Sensor>(i), condition));
+  for (const Sensor sensor : all_sensors) {
+    if (!condition.inputs[index_of(sensor)].topic.empty()) out.push_back(status_of(sensor, condition));
   }
   return out;
 }

@@ -16,17 +16,13 @@ std::array<bool, sensor_count> configured(const lab::Settings& settings) {
   return out;
 }
 
-std::array<double, sensor_count> rates_of(const Robot& robot) {
-  return {robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate};
-}
-
 }  // namespace
 
 lab::Settings load_settings(const std::string& config, const std::vector<std::string>& overrides) {
   lab::Settings settings = lab::load_settings(config, overrides);
   std::vector<Sensor> used;
-  for (int i = 0; i < sensor_count; ++i) {
-    if (settings.has(static_cast<Sensor>(i))) used.push_back(static_cast<Sensor>(i));
+  for (const Sensor sensor : all_sensors) {
+    if (settings.has(sensor)) used.push_back(sensor);
   }
   if (used.empty() || used.front() != Sensor::imu)
     throw lab::ConfigError(config + ": imu.topic is missing: nothing is estimated without the IMU");

@@ -13,11 +13,6 @@ constexpr std::size_t most_kinds = 100;  // of faults that are told
 // Images that come compressed are left out while the same come uncompressed.
 constexpr auto raw_is_near = std::chrono::seconds(1);
 
-double offset_of(const Robot& robot, Sensor sensor) {
-  const double offsets[] = {robot.imu.time_offset, robot.legs.time_offset, robot.lidar.time_offset, robot.camera.time_offset};
-  return offsets[static_cast<std::size_t>(sensor)];
-}
-
 std::string accepted_text(Sensor sensor) {
   std::string text;
   for (const auto type : lab::accepted_types(sensor)) text += fmt::format("{}{}", text.empty() ? "" : " or ", type);
@@ -29,10 +24,9 @@ std::string accepted_text(Sensor sensor) {
 SensorInputs::SensorInputs(const lab::Settings& settings, bool no_deskew, Sink sink, Say say)
     : sink_(std::move(sink)), say_(std::move(say)), lidar_rate_(settings.robot.lidar.rate), leg_clock_(settings.leg_clock, settings.robot) {
   if (no_deskew) point_time_.emplace();
-  for (int i = 0; i < sensor_count; ++i) {
-    const auto sensor = static_cast<Sensor>(i);
+  for (const Sensor sensor : all_sensors) {
     input_of(sensor).topic = settings.topic(sensor);
-    input_of(sensor).intake = lab::SensorIntake(offset_of(settings.robot, sensor));
+    input_of(sensor).intake = lab::SensorIntake(time_offsets_of(settings.robot)[index_of(sensor)]);
   }
 }
 

@@ -11,8 +11,7 @@ constexpr std::uint32_t most_samples = 2000, most_pictures = 20;  // messages th
 
 RosInputs::RosInputs(const lab::Settings& settings, node::SensorInputs& inputs)
     : inputs_(inputs), fast_spinner_(1, &fast_queue_), slow_spinner_(1, &slow_queue_) {
-  for (int i = 0; i < sensor_count; ++i) {
-    const auto sensor = static_cast<Sensor>(i);
+  for (const Sensor sensor : all_sensors) {
     if (!settings.has(sensor)) continue;
     const std::string& topic = settings.topic(sensor);
     subscribe(sensor, topic, false);

@@ -32,8 +32,7 @@ class Ros2Node : public rclcpp::Node {
     }
     kilvo_ = std::make_unique<node::Node>(options, settings, outlet(),
                                           [this](const std::string& text) { RCLCPP_INFO(get_logger(), "%s", text.c_str()); });
-    for (int i = 0; i < sensor_count; ++i) {
-      const auto sensor = static_cast<Sensor>(i);
+    for (const Sensor sensor : all_sensors) {
       if (settings.has(sensor)) subscribe(sensor, settings.topic(sensor));
     }
     timer_ = create_wall_timer(std::chrono::milliseconds(100), [this] { kilvo_->tick(time_from_ns(now().nanoseconds())); });

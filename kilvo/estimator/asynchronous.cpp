@@ -4,6 +4,7 @@
 
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/filter/gap.hpp"
+#include "kilvo/legs/leg_kinematics.hpp"
 #include "kilvo/math/stopwatch.hpp"
 
 namespace kilvo {
@@ -24,7 +25,7 @@ void Estimator::process(ImuSample s, std::vector<Output>& out) {
   if ((was_blind && status_.has_legs()) || (s.t >= history_.closed().t && status_.are_legs_lost(heard, input_.health()))) {
     history_.end_stances(was_blind ? heard : s.t);
     legs_.restart();
-    status_.lose_legs(findings_.statistics().sensors[index_of(Sensor::legs)].used > 0);
+    status_.lose_legs();
   }
   status_.imu_is_back();
   history_.add(s);
@@ -64,7 +65,7 @@ void Estimator::process(const JointSample& s, std::vector<Output>& out) {
   const Feet& feet = std::get<Feet>(known);
   findings_.use(Sensor::legs);
   if (!status_.has_legs()) legs_.expect_a_stance_from(s.t);
-  status_.legs_used(s.t);
+  status_.use(Sensor::legs, s.t);
 
   history_.predict_to(s.t);
   const auto ground = row_of(status_.modality()).ground_is_measured ? StanceTracker::Ground::use : StanceTracker::Ground::learn;

@@ -6,6 +6,7 @@
 
 #include "kilvo/estimator/live_propagator.hpp"
 #include "kilvo/filter/gap.hpp"
+#include "kilvo/legs/leg_kinematics.hpp"
 
 namespace kilvo {
 namespace {
@@ -18,8 +19,7 @@ PoseCovariance common_error(const WorldMap& map, const LidarPipeline& lidar, con
 }  // namespace
 
 Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::array<bool, sensor_count> used)
-    : robot_(robot),
-      config_(config),
+    : config_(config),
       input_(robot, used, from_seconds(config.max_wait), config.wait_for_images),
       starter_(config),
       imu_(robot.imu, config.initial),
@@ -28,13 +28,19 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       lidar_(robot.lidar, config.lidar, config.update, config.threads),
       map_(config.map, config.lidar, robot.lidar.T_imu_lidar.p),
       frames_(robot.lidar.rate, input_.uses(Sensor::lidar), config.lidar.recut && input_.uses(Sensor::camera)),
-      status_(robot, input_.uses(Sensor::lidar), config.settling) {
+      status_(robot, config.settling) {
   if (!input_.uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.surfaces().leaf_size() * (1 + 1e-9))
     throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
   if (input_.uses(Sensor::legs)) kinematics_ = std::make_unique<LegKinematics>(robot, config.legs.contact == "force");
   if (input_.uses(Sensor::camera)) vision_.emplace(robot.camera, config.vision, config.visual_map, config.update, config.map.radius);
 }
+
+Estimator::Estimator(Estimator&&) noexcept = default;
+Estimator& Estimator::operator=(Estimator&&) noexcept = default;
+Estimator::~Estimator() = default;
+
+std::optional<std::string> Estimator::mismatch(const JointSample& s) const { return kinematics_ ? kinematics_->mismatch(s) : std::nullopt; }
 
 std::vector<Output> Estimator::push(Measurement m) {
   std::vector<Output> out;
@@ -49,7 +55,7 @@ void Estimator::push(Measurement m, std::vector<Output>& out) {
     // Another recording, or the same again. What waited belongs to the time before; nothing else is kept.
     finish(out);
     InputQueue input = input_.next_epoch();
-    Estimator fresh(robot_, config_, input.used());
+    Estimator fresh(input.robot(), config_, input.used());
     fresh.input_ = std::move(input);
     fresh.findings_ = findings_.next_epoch();
     if (map_.is_given()) fresh.give_map(map_.take());
@@ -57,7 +63,8 @@ void Estimator::push(Measurement m, std::vector<Output>& out) {
     findings_.report(situation(), {}, Reason::began_anew, to_seconds(input_.clock_steps().last()));
   }
   if (input_.health().imu_silence() > blind_gap) lose_imu(out);
-  drain(out);
+  for (const auto& [sensor, reason] : input_.take_refused()) findings_.drop(sensor, reason);
+  while (auto next = input_.pop()) handle(std::move(*next), out);
 }
 
 std::vector<Output> Estimator::finish() {
@@ -66,32 +73,26 @@ std::vector<Output> Estimator::finish() {
   return out;
 }
 
-// What came through the queue, and what did not.
-void Estimator::drain(std::vector<Output>& out) {
-  for (const auto& [sensor, reason] : input_.take_refused()) findings_.drop(sensor, reason);
-  while (auto next = input_.pop()) handle(std::move(*next), out);
-}
-
 void Estimator::handle(Measurement m, std::vector<Output>& out) {
-  std::optional<FrameQueue::Frame> crowded_out;
   if (!history_.has_begun()) {
     const auto start = starter_.add(std::move(m));
     for (const Sensor s : starter_.take_dropped()) findings_.drop(s, Reason::before_start);
     if (start) begin(*start, out);
-  } else if (auto* imu = std::get_if<ImuSample>(&m)) {
-    process(*imu, out);
-  } else if (const auto* joints = std::get_if<JointSample>(&m)) {
-    process(*joints, out);
-  } else if (auto* scan = std::get_if<LidarScan>(&m)) {
-    crowded_out = frames_.push(std::move(*scan));
-  } else if (auto* image = std::get_if<CameraImage>(&m)) {
-    if (const auto fault = vision_->fault_of(*image)) {
-      if (!fault->detail.empty()) findings_.report(situation(), Sensor::camera, Reason::foreign_images, 0, fault->detail);
-      return findings_.drop(Sensor::camera, fault->reason);
-    }
-    crowded_out = frames_.push(std::move(*image));
+    return;
   }
-  if (crowded_out) findings_.drop(crowded_out->sensor(), Reason::no_imu);
+  const auto* image = std::get_if<CameraImage>(&m);
+  if (const auto fault = image == nullptr ? std::nullopt : vision_->fault_of(*image)) {
+    if (!fault->detail.empty()) findings_.report(situation(), Sensor::camera, Reason::foreign_images, 0, fault->detail);
+    return findings_.drop(Sensor::camera, fault->reason);
+  }
+  const auto take = [&](auto& what) {
+    if constexpr (requires { process(what, out); }) {
+      process(what, out);
+    } else if (const auto crowded_out = frames_.push(std::move(what))) {
+      findings_.drop(crowded_out->sensor(), Reason::no_imu);
+    }
+  };
+  std::visit(take, m);
 }
 
 void Estimator::begin(const Start& start, std::vector<Output>& out) {
@@ -99,7 +100,7 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   imu_.set_scale(start.accel_scale);
   // Sweeps see for themselves how a robot settles while it stands.
   history_.begin(start.estimate, input_.uses(Sensor::lidar) ? std::nullopt : start.rest_until);
-  status_.begin(t, input_.uses(Sensor::legs));
+  status_.begin(t, input_.used());
   // On the move the first sweeps find the velocity, and the legs tell it within a step.
   constexpr Duration to_settle = std::chrono::seconds(2), a_step = std::chrono::seconds(1);
   if (vision_) vision_->begin_at(start.still ? t : t + to_settle);
@@ -121,9 +122,10 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
 void Estimator::finish(std::vector<Output>& out) {
   input_.end();
   frames_.end();
-  drain(out);
+  for (const auto& [sensor, reason] : input_.take_refused()) findings_.drop(sensor, reason);
+  while (auto next = input_.pop()) handle(std::move(*next), out);
   // A scan that ends between the last IMU sample and where the next would have been: the last sample is held.
-  const Duration period = from_seconds(1.5 / robot_.imu.rate);
+  const Duration period = from_seconds(1.5 / input_.robot().imu.rate);
   if (history_.has_begun() && history_.replay().has_imu() && frames_.has_one_until(history_.replay().newest_imu().t + period)) {
     ImuSample held = history_.replay().newest_imu();
     held.t = std::max(held.t, frames_.first_end());

@@ -20,12 +20,12 @@
 #include "kilvo/estimator/starter.hpp"
 #include "kilvo/estimator/world_map.hpp"
 #include "kilvo/input/input_queue.hpp"
-#include "kilvo/legs/leg_kinematics.hpp"
 #include "kilvo/legs/leg_pipeline.hpp"
 #include "kilvo/vision/visual_pipeline.hpp"
 
 namespace kilvo {
 
+class LegKinematics;
 class LivePropagator;
 
 class Estimator {
@@ -33,6 +33,9 @@ class Estimator {
   /// `used`: which sensors will be pushed, by Sensor; others are ignored and counted. Throws std::invalid_argument when a setting makes
   /// no sense (its name is in the text).
   Estimator(const Robot& robot, const EstimatorConfig& config, std::array<bool, sensor_count> used);
+  Estimator(Estimator&&) noexcept;
+  Estimator& operator=(Estimator&&) noexcept;
+  ~Estimator();
 
   /// The surroundings are known: sweeps are registered to this map, in the estimator's world, and leave it as it is. Before any push.
   void give_map(VoxelMap map) { map_.give(std::move(map)); }
@@ -51,7 +54,7 @@ class Estimator {
   void finish(std::vector<Output>& out);
 
   /// Why leg messages like this one cannot be used with this robot, if so: the first of them decides whether a run makes sense.
-  std::optional<std::string> mismatch(const JointSample& s) const { return kinematics_ ? kinematics_->mismatch(s) : std::nullopt; }
+  std::optional<std::string> mismatch(const JointSample& s) const;
 
   const Statistics& statistics() const { return findings_.statistics(); }
   /// Events that no output has carried: after finish(), or before the first output.
@@ -67,7 +70,6 @@ class Estimator {
 
  private:
   // What came through the queue, in the order of time.
-  void drain(std::vector<Output>& out);
   void handle(Measurement m, std::vector<Output>& out);
   void begin(const Start& start, std::vector<Output>& out);
 
@@ -87,7 +89,6 @@ class Estimator {
   void emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0,
             double contact_us = 0);
 
-  Robot robot_;
   EstimatorConfig config_;
   InputQueue input_;
   Starter starter_;

@@ -104,9 +104,8 @@ void Findings::report_clock_offset(const Situation& now, Sensor s, double total,
 // What the streams themselves showed.
 void Findings::report_streams(const Situation& now) {
   statistics_.health = now.health.streams();
-  for (std::size_t s = 0; s < sensor_count; ++s) {
-    const StreamHealth& stream = statistics_.health[s];
-    const auto sensor = static_cast<Sensor>(s);
+  for (const Sensor sensor : all_sensors) {
+    const StreamHealth& stream = statistics_.health[index_of(sensor)];
     constexpr double late = 0.25;  // s
     if (stream.off_clock > 4) events_.state({now.t, sensor, Reason::clock_ahead, stream.clock_offset, stream.off_clock, {}});
     if (stream.messages > few && stream.mean_lag > late) events_.state({now.t, sensor, Reason::lagging, stream.mean_lag, 1, {}});

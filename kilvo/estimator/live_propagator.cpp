@@ -7,7 +7,7 @@
 namespace kilvo {
 
 LivePropagator::LivePropagator(const Robot& robot, const EstimatorConfig& config)
-    : history_(config), legs_(config.legs), imu_(robot.imu, config.initial), status_(robot, false) {}
+    : history_(config), legs_(config.legs), imu_(robot.imu, config.initial), status_(robot) {}
 
 void LivePropagator::become(const History& history, const LegPipeline& legs, const ImuWatch& imu, const SensorStatus& status,
                             const PoseCovariance& common_error, std::uint32_t epoch) {
@@ -36,25 +36,25 @@ bool LivePropagator::push(const ImuSample& raw) {
   if (imu_.prepare(s)) return false;
   history_.add(s);
   // The estimator will report it as well, once it has stopped waiting for them.
-  if (status_.has_legs() && status_.are_legs_silent(s.t - *status_.last_legs() - lag_)) status_.miss_legs();
+  if (status_.has_legs() && status_.are_legs_silent(s.t - *status_.last_used(Sensor::legs) - lag_)) status_.miss_legs();
   if (status_.has_legs() && !status_.are_legs_overdue(s.t - lag_)) return false;
-  history_.close_fork(s.t, status_.last_legs());
+  history_.close_fork(s.t, status_.last_used(Sensor::legs));
   with_legs_ = false;
   return keep_finite();
 }
 
 bool LivePropagator::push(const Feet& feet) {
   if (!started_ || imu_lost()) return false;
-  if (!status_.has_legs() || feet.t <= *status_.last_legs() || feet.t < known()) return false;
+  if (!status_.has_legs() || feet.t <= *status_.last_used(Sensor::legs) || feet.t < known()) return false;
   if (status_.is_imu_missing(feet.t - history_.replay().newest_imu().t)) return false;
-  if (status_.are_legs_silent(feet.t - *status_.last_legs())) {
-    status_.lose_legs(true);  // they come again: how, the estimator decides
+  if (status_.are_legs_silent(feet.t - *status_.last_used(Sensor::legs))) {
+    status_.lose_legs();  // they come again: how, the estimator decides
     return false;
   }
   Stopwatch watch;
-  history_.close_fork(feet.t, status_.last_legs());
+  history_.close_fork(feet.t, status_.last_used(Sensor::legs));
   if (feet.t < history_.now().t) return false;
-  status_.legs_used(feet.t);
+  status_.use(Sensor::legs, feet.t);
   history_.predict_to(feet.t);
   // Without the map: it is the estimator's, and grows. What the ground tells is told by the next fork.
   const auto [step, contact_us] =

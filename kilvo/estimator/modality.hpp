@@ -37,9 +37,6 @@ constexpr Modality modality_of(bool legs, bool lidar, bool camera) {
   return Modality::coast;
 }
 
-/// What is left of it when the legs are lost.
-constexpr Modality without_legs(Modality m) { return modality_of(false, has_lidar(m), has_camera(m)); }
-
 static_assert([] {
   for (std::size_t i = 0; i < modalities.size(); ++i) {
     if (modalities[i].modality != static_cast<Modality>(i)) return false;

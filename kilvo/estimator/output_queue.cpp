@@ -6,17 +6,13 @@
 
 namespace kilvo {
 
-void OutputQueue::add_sweep(Output o) {
-  o.is_sweep = true;
-  sweeps_.push_back(std::move(o));
-}
-
 Output* OutputQueue::next(Time t, std::vector<Output>& out) {
   if (last_ && t <= *last_) return nullptr;
   last_ = t;
   Output* const o = &out.emplace_back();
   if (!sweeps_.empty()) {
     *o = std::move(sweeps_.front());
+    o->is_sweep = true;
     sweeps_.pop_front();
   }
   if (!images_.empty()) {

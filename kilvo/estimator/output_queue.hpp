@@ -13,7 +13,7 @@ namespace kilvo {
 class OutputQueue {
  public:
   /// A sweep's, an image's part of an output that has yet to come.
-  void add_sweep(Output o);
+  void add_sweep(Output o) { sweeps_.push_back(std::move(o)); }
   void add_image(Output o) { images_.push_back(std::move(o)); }
   bool empty() const { return sweeps_.empty() && images_.empty(); }
   bool has_sweep() const { return !sweeps_.empty(); }

@@ -15,28 +15,20 @@ namespace kilvo {
 
 class SensorStatus {
  public:
-  /// `with_lidar`: the LiDAR is to be used. `settling`: see EstimatorConfig.
-  SensorStatus(const Robot& robot, bool with_lidar, std::string_view settling = "legs")
-      : rates_{robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate},
-        with_lidar_(with_lidar),
-        settles_all_(settling == "all"),
-        settles_nothing_(settling == "none") {}
+  /// `settling`: see EstimatorConfig.
+  explicit SensorStatus(const Robot& robot, std::string_view settling = "legs");
 
-  /// The first estimate is of `t`. `legs`: they are taken as there until they stay silent.
-  void begin(Time t, bool legs);
+  /// The first estimate is of `t`. `there`: by Sensor; legs and LiDAR are taken as used until they stay silent.
+  void begin(Time t, const std::array<bool, sensor_count>& there);
 
   /// Something of this sensor at `t` (of a scan: its end) carried the estimate.
-  void sweep_used(Time end);
-  void image_used(Time t);
-  void legs_used(Time t);
-  /// `were_there`: they have been used before.
-  void lose_legs(bool were_there);
+  void use(Sensor s, Time t);
+  /// When it carried the estimate last, or the start; of legs that are lost: never.
+  std::optional<Time> last_used(Sensor s) const { return tracks_[index_of(s)].used; }
+  void lose_legs();
   /// They are lost, and nothing else is asked about: who runs ahead cannot know why.
   void miss_legs();
-  bool has_legs() const { return last_legs_.has_value(); }
-  std::optional<Time> last_legs() const { return last_legs_; }
-  /// End of the last sweep that was used, or the start.
-  Time last_sweep() const { return last_sweep_; }
+  bool has_legs() const { return last_used(Sensor::legs).has_value(); }
 
   /// The legs have been silent for so long, or say the same for so long, that they count as lost. `imu_heard`: the newest IMU sample
   /// before this one; where the IMU was silent as well, nobody can say it.
@@ -59,25 +51,27 @@ class SensorStatus {
   bool imu_lost() const { return imu_lost_; }
 
   enum class Change : std::uint8_t { none, of_cause, of_modality };
-  /// Decides on the modality of `t` from what was used until then. Of the cause alone: the IMU has come back, and nothing else is there.
+  /// Decides on the modality of `t` from what was used until then. Of the cause alone: the modality is what it was.
   Change choose(Time t, const Health& health);
   Modality modality() const { return modality_; }
-  /// Of the last change.
-  Reason cause() const { return cause_; }
+  Reason cause() const { return cause_; }  // of the last change
 
  private:
-  Reason cause_of_change(Time t, Modality now, const Health& health) const;
-  double rate_of(Sensor s) const { return rates_[index_of(s)]; }
+  struct Track {
+    double rate = 0;                  // Hz, nominal
+    std::optional<Time> used;         // last
+    std::optional<Time> waits_since;  // messages come again that are not used yet
+    bool was_used = false;            // since the start
+    bool counts = false;              // as of the last choose()
+  };
+  Track& track(Sensor s) { return tracks_[index_of(s)]; }
+  double rate_of(Sensor s) const { return tracks_[index_of(s)].rate; }
   bool has_waited(Sensor s, Time t);
+  Reason cause_of_change(Sensor s, Time t, const Health& health) const;
 
-  std::array<double, sensor_count> rates_;  // Hz, by Sensor
-  bool with_lidar_, settles_all_, settles_nothing_;
-  Time last_sweep_{};
-  std::optional<Time> last_image_;
-  std::optional<Time> last_legs_;                              // while the legs are used
-  double leg_period_ = 0;                                      // between the last two leg samples, s
-  std::array<std::optional<Time>, sensor_count> waits_since_;  // by Sensor: since when messages come again that are not used yet
-  bool legs_were_there_ = false, sweeps_were_there_ = false;
+  std::array<Track, sensor_count> tracks_;  // by Sensor
+  bool settles_all_, settles_nothing_;
+  double leg_period_ = 0;  // between the last two leg samples, s
   bool imu_lost_ = false;
   Modality modality_ = Modality::coast;
   Reason cause_ = Reason::start;

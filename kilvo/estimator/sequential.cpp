@@ -26,7 +26,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   if (end < history_.base().t) return findings_.drop(Sensor::lidar, Reason::before_state);
   if (history_.replay().is_blind(begin, end)) return findings_.drop(Sensor::lidar, Reason::no_imu);
   if (!status_.may_frame_return(Sensor::lidar, end, imu_.is_calm(end))) return findings_.drop(Sensor::lidar, Reason::not_calm);
-  if (frames_.last_middle()) lidar_.note_silence(begin - status_.last_sweep());
+  if (frames_.last_middle()) lidar_.note_silence(begin - *status_.last_used(Sensor::lidar));
   Stopwatch watch;
   // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
   // the sweep cancels to first order. What came since is propagated again.
@@ -61,7 +61,8 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
     const auto clock = lidar_.compare_turns(prior, sweep.posterior, history_.trajectory(), begin, end);
     if (clock.doubtful && vision_) vision_->restart_mount_check();  // it may see nothing but this
     if (clock.offset)
-      findings_.report_clock_offset(situation(), Sensor::lidar, input_.shift_by(Sensor::lidar, *clock.offset), robot_.lidar.time_offset);
+      findings_.report_clock_offset(situation(), Sensor::lidar, input_.shift_by(Sensor::lidar, *clock.offset),
+                                    input_.robot().lidar.time_offset);
     history_.correct_trajectory(sweep.posterior, sweep.posterior.x.v - prior.x.v);
     lidar_.accept(sweep);
     if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior);
@@ -73,7 +74,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
 
   history_.advance_to(end);
   findings_.use(Sensor::lidar);
-  if (sweep.carries) status_.sweep_used(end);
+  if (sweep.carries) status_.use(Sensor::lidar, end);
   // Images hold what no sweep does: better than the legs do.
   if (sweep.carries && !first && !(lidar_.is_blind_somewhere() && has_camera(status_.modality())))
     legs_.pose_is_measured(lidar_.unobservable().bottomRightCorner<3, 3>());
@@ -96,8 +97,8 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
   if (!motion) return refuse(Reason::before_state);
   if (history_.replay().is_blind(image.t, image.t)) return refuse(Reason::no_imu);
   // Vision lives by the surfaces of the LiDAR: without it, nobody can tell what hides what, and images can only drift.
-  const Duration half_scan = from_seconds(0.5 / robot_.lidar.rate);
-  if (is_silence(image.t - frames_.last_middle().value_or(Time{}) - half_scan, robot_.lidar.rate)) return refuse(Reason::no_lidar);
+  const double rate = input_.robot().lidar.rate;
+  if (is_silence(image.t - frames_.last_middle().value_or(Time{}) - from_seconds(0.5 / rate), rate)) return refuse(Reason::no_lidar);
   if (lidar_.is_rejoining()) return refuse(Reason::before_rejoined);
   if (!status_.may_frame_return(Sensor::camera, image.t, imu_.is_calm(image.t))) return refuse(Reason::not_calm);
   Stopwatch watch;
@@ -128,8 +129,8 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
   Output result;
   result.coloured = vision_->learn(map_.surfaces(), map_.error().total(seen.T_WI, seen.posterior.P.topLeftCorner<6, 6>()));
   if (const auto offset = vision_->clock_offset())
-    findings_.report_clock_offset(situation(), Sensor::camera, input_.shift_by(Sensor::camera, *offset), robot_.camera.time_offset);
-  if (seen.carries) status_.image_used(image.t);
+    findings_.report_clock_offset(situation(), Sensor::camera, input_.shift_by(Sensor::camera, *offset), input_.robot().camera.time_offset);
+  if (seen.carries) status_.use(Sensor::camera, image.t);
   result.indicators = indicators_of(seen.used, seen.carries);
   result.stages.visual_us = watch.lap_us();
   outputs_.add_image(std::move(result));

@@ -28,8 +28,9 @@ std::optional<Reason> fault_of(const JointSample& s) {
 std::optional<Reason> fault_of(const Measurement& m) {
   if (const auto* scan = std::get_if<LidarScan>(&m)) return when(scan->points.empty(), Reason::empty);
   if (const auto* image = std::get_if<CameraImage>(&m)) return when(image->image.empty(), Reason::empty);
+  if (const auto* joints = std::get_if<JointSample>(&m)) return fault_of(*joints);
   const auto* imu = std::get_if<ImuSample>(&m);
-  return imu != nullptr ? fault_of(*imu) : fault_of(std::get<JointSample>(m));
+  return imu == nullptr ? std::nullopt : fault_of(*imu);
 }
 
 }  // namespace kilvo

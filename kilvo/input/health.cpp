@@ -39,7 +39,7 @@ bool is_return(const Eigen::Vector3f& p) { return p.allFinite() && !p.isZero(0);
 
 }  // namespace
 
-Health::Health(const Robot& robot) : rates_{robot.imu.rate, robot.legs.rate, robot.lidar.rate, robot.camera.rate} {}
+Health::Health(const Robot& robot) : rates_(rates_of(robot)) {}
 
 void Health::time(StreamHealth& stream, Tracker& tracker, Time t) {
   ++stream.messages;
@@ -80,8 +80,9 @@ bool Health::repeats(const Measurement& m) {
     return same;
   }
   if (const auto* scan = std::get_if<LidarScan>(&m)) return repeats(*scan);
-  const auto& pixels = std::get<CameraImage>(m).image.pixels;
-  const std::uint64_t print = fingerprint(pixels.data(), pixels.size());
+  const auto* image = std::get_if<CameraImage>(&m);
+  if (image == nullptr) return false;
+  const std::uint64_t print = fingerprint(image->image.pixels.data(), image->image.pixels.size());
   return std::exchange(picture_, print) == print;
 }
 
@@ -96,29 +97,17 @@ std::optional<Reason> Health::judge_repeats(const Measurement& m, StreamHealth& 
   }
   ++stream.repeated;
   if (tracker.same++ == 0) tracker.same_since = t;
-  bool frozen = false;
-  switch (sensor_of(m)) {
-    case Sensor::imu:
-      if (tracker.different < alive) return tracker.different = 0, std::nullopt;
-      frozen = tracker.same >= imu_same;
-      break;
-    case Sensor::legs:
-      if (imu_motion_ < moving && !tracker.frozen) return tracker.same = 0, std::nullopt;
-      frozen = to_seconds(t - tracker.same_since) > legs_same;
-      break;
-    case Sensor::lidar:
-      frozen = tracker.same >= scans_same;
-      break;
-    case Sensor::camera:
-      frozen = tracker.same >= images_same;
-      break;
-  }
+  const Sensor s = sensor_of(m);
+  if (s == Sensor::imu && tracker.different < alive) return tracker.different = 0, std::nullopt;
+  if (s == Sensor::legs && imu_motion_ < moving && !tracker.frozen) return tracker.same = 0, std::nullopt;
+  const int many = s == Sensor::imu ? imu_same : s == Sensor::lidar ? scans_same : images_same;
+  const bool frozen = s == Sensor::legs ? to_seconds(t - tracker.same_since) > legs_same : tracker.same >= many;
   if (frozen && !std::exchange(tracker.frozen, true)) ++stream.frozen;
   if (tracker.frozen) return Reason::frozen;
   // A pair of equal IMU samples may be a driver's; leg messages may come faster than the encoders are read.
-  const bool may_be = sensor_of(m) == Sensor::legs || (sensor_of(m) == Sensor::imu && tracker.same < 2);
+  const bool may_be = s == Sensor::legs || (s == Sensor::imu && tracker.same < 2);
   if (may_be) return std::nullopt;
-  return sensor_of(m) == Sensor::camera ? Reason::repeated_image : Reason::repeated_values;
+  return s == Sensor::camera ? Reason::repeated_image : Reason::repeated_values;
 }
 
 // The IMU is the clock. A stamp may lie ahead of it because the IMU is silent or late, with all others; or because that clock is wrong:

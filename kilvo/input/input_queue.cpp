@@ -42,9 +42,7 @@ void InputQueue::admit(Measurement m, std::optional<Reason> off_clock) {
   if (const auto fault = fault_of(m)) return refuse(s, *fault);
   if (off_clock) return refuse(s, *off_clock);
   if (const auto fault = health_.judge(m)) return refuse(s, *fault);
-  const Duration by = shift_[index_of(s)];
-  if (auto* scan = std::get_if<LidarScan>(&m)) scan->t += by;
-  if (auto* image = std::get_if<CameraImage>(&m)) image->t += by;
+  std::visit([by = shift_[index_of(s)]](auto& what) { what.t += by; }, m);
   if (const auto refused = timeline_.push(std::move(m))) refuse(s, *refused);
   for (const Sensor jumped : timeline_.take_jumped()) refuse(jumped, Reason::time_jump);
   for (const Sensor waited : timeline_.take_given_up()) refuse(waited, Reason::no_imu);

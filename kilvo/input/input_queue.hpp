@@ -43,6 +43,7 @@ class InputQueue {
   /// they are later in all, s, which is bounded.
   double shift_by(Sensor s, double by);
 
+  const Robot& robot() const { return robot_; }
   bool uses(Sensor s) const { return used_[index_of(s)]; }
   const std::array<bool, sensor_count>& used() const { return used_; }
   const ClockSteps& clock_steps() const { return clock_steps_; }

@@ -89,7 +89,7 @@ std::optional<Reason> Timeline::admit(Measurement m, Time key) {
     waiting_.insert(std::move(spare_.back()));
     spare_.pop_back();
   }
-  bound(s);
+  bound(sensor);
   return std::nullopt;
 }
 
@@ -102,21 +102,21 @@ void Timeline::note_legs(Time key) {
   if (released_ && key < *released_) newest = std::max(newest.value_or(key), key);
 }
 
-void Timeline::bound(std::size_t s) {
+void Timeline::bound(Sensor sensor) {
   // It is the clock: nothing of it waits for long.
-  if (static_cast<Sensor>(s) == Sensor::imu) return;
-  const auto is_of = [s](const auto& entry) { return static_cast<std::size_t>(std::get<Sensor>(entry.first)) == s; };
+  if (sensor == Sensor::imu) return;
+  const std::size_t s = index_of(sensor);
   for (auto oldest = waiting_.begin(); oldest != waiting_.end();) {
     // Nothing that waits is older than what waits at the front.
     if (bytes_[s] <= most_bytes && *newest_[s] - std::get<Time>(oldest->first) <= longest_wait) return;
-    if (!is_of(*oldest)) {
+    if (std::get<Sensor>(oldest->first) != sensor) {
       ++oldest;
       continue;
     }
     const std::size_t size = bytes_of(oldest->second);
     if (bytes_[s] == size) return;  // it is the only one
     bytes_[s] -= size;
-    given_up_.push_back(static_cast<Sensor>(s));
+    given_up_.push_back(sensor);
     oldest = waiting_.erase(oldest);
   }
 }
@@ -129,15 +129,15 @@ void Timeline::note_spacing(std::size_t s, Time key) {
 }
 
 // Something may come of this sensor that must go before.
-bool Timeline::is_awaited(std::size_t s, Time key) const {
-  const auto sensor = static_cast<Sensor>(s);
+bool Timeline::is_awaited(Sensor sensor, Time key) const {
+  const std::size_t s = index_of(sensor);
   if (sensor == Sensor::camera && !wait_for_images_) return false;
   const bool is_frame = sensor == Sensor::lidar || sensor == Sensor::camera;
   const auto& imu = newest_[index_of(Sensor::imu)];
   // Who has been silent for long, or was never there, is not waited for.
   const Duration longest = is_frame ? std::max(max_wait_, 3 * spacing_[s]) : std::max(silence, 5 * spacing_[s]) + legs_lag_;
   if (sensor != Sensor::imu && imu && newest_[s] && *imu - *newest_[s] > longest) return false;
-  if (sensor == Sensor::legs && imu && first_imu_ && !newest_[s] && *imu - *first_imu_ > never) return false;
+  if (!is_frame && imu && first_imu_ && !newest_[s] && *imu - *first_imu_ > never) return false;
   // A frame that comes so much sooner than the one before is fused late, no more.
   return !newest_[s] || *newest_[s] + (is_frame ? 7 * spacing_[s] / 10 : Duration(0)) < key;
 }
@@ -149,10 +149,7 @@ bool Timeline::may_go(Time key) const {
   const auto& imu = newest_[index_of(Sensor::imu)];
   const bool waited = expected_[index_of(Sensor::imu)] ? imu && *imu - key >= max_wait_ : *newest_of_all_ - key >= max_wait_;
   if (ended_ || waited || waiting_.size() > most) return true;
-  for (std::size_t s = 0; s < sensor_count; ++s) {
-    if (expected_[s] && is_awaited(s, key)) return false;
-  }
-  return true;
+  return std::ranges::none_of(all_sensors, [&](Sensor s) { return expected_[index_of(s)] && is_awaited(s, key); });
 }
 
 std::optional<Measurement> Timeline::pop() {

@@ -53,10 +53,10 @@ class Timeline {
 
  private:
   bool may_go(Time key) const;
-  bool is_awaited(std::size_t s, Time key) const;
+  bool is_awaited(Sensor sensor, Time key) const;
   void note_spacing(std::size_t s, Time key);
   void give_up_suspects();
-  void bound(std::size_t s);
+  void bound(Sensor sensor);
   void note_legs(Time key);
   std::optional<Reason> admit(Measurement m, Time key);
 

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <variant>
@@ -49,20 +51,20 @@ struct CameraImage {
 
 using Measurement = std::variant<ImuSample, JointSample, LidarScan, CameraImage>;
 
+/// In the order of the alternatives of Measurement.
 enum class Sensor : std::uint8_t { imu, legs, lidar, camera };
-inline constexpr int sensor_count = 4;
+inline constexpr std::size_t sensor_count = std::variant_size_v<Measurement>;
+inline constexpr std::array all_sensors = {Sensor::imu, Sensor::legs, Sensor::lidar, Sensor::camera};
+static_assert(all_sensors.size() == sensor_count);
 constexpr std::size_t index_of(Sensor s) { return static_cast<std::size_t>(s); }
 
 /// The name used on the command line and in files: "imu", "legs", "lidar", "camera".
 constexpr const char* name_of(Sensor s) {
-  constexpr const char* names[] = {"imu", "legs", "lidar", "camera"};
-  return names[static_cast<int>(s)];
+  constexpr std::array<const char*, sensor_count> names = {"imu", "legs", "lidar", "camera"};
+  return names[index_of(s)];
 }
 
-inline Sensor sensor_of(const Measurement& m) {
-  constexpr Sensor order[] = {Sensor::imu, Sensor::legs, Sensor::lidar, Sensor::camera};
-  return order[m.index()];
-}
+inline Sensor sensor_of(const Measurement& m) { return static_cast<Sensor>(m.index()); }
 
 inline Time stamp_of(const Measurement& m) {
   return std::visit([](const auto& x) { return x.t; }, m);

@@ -21,7 +21,7 @@ TEST(Measurement, KnowsItsSensorAndStamp) {
     EXPECT_EQ(stamp_of(c.m), t);
     EXPECT_EQ(std::string(name_of(c.sensor)), c.name);
   }
-  EXPECT_EQ(std::size(cases), static_cast<std::size_t>(sensor_count));
+  EXPECT_EQ(std::size(cases), sensor_count);
 }
 
 }  // namespace measurement_test

@@ -9,6 +9,7 @@
 
 #include "kilvo/math/field.hpp"
 #include "kilvo/math/se3.hpp"
+#include "kilvo/sensors/measurement.hpp"
 
 namespace kilvo {
 
@@ -98,5 +99,12 @@ struct Robot {
   LidarMount lidar;
   CameraMount camera;
 };
+
+/// Nominal, Hz, by Sensor.
+inline std::array<double, sensor_count> rates_of(const Robot& r) { return {r.imu.rate, r.legs.rate, r.lidar.rate, r.camera.rate}; }
+/// Added to the stamps, s, by Sensor.
+inline std::array<double, sensor_count> time_offsets_of(const Robot& r) {
+  return {r.imu.time_offset, r.legs.time_offset, r.lidar.time_offset, r.camera.time_offset};
+}
 
 }  // namespace kilvo

@@ -6,6 +6,7 @@
 
 #include "kilvo/filter/pose_error.hpp"
 #include "kilvo/filter/update.hpp"
+#include "kilvo/map/voxel_map.hpp"
 #include "kilvo/vision/depth_view.hpp"
 #include "kilvo/vision/new_points.hpp"
 #include "kilvo/vision/photometric.hpp"

@@ -13,7 +13,6 @@
 #include "kilvo/filter/state.hpp"
 #include "kilvo/filter/update_config.hpp"
 #include "kilvo/map/visual_map.hpp"
-#include "kilvo/map/voxel_map.hpp"
 #include "kilvo/sensors/measurement.hpp"
 #include "kilvo/sensors/reason.hpp"
 #include "kilvo/sensors/robot.hpp"
@@ -23,6 +22,8 @@
 #include "kilvo/vision/vision_config.hpp"
 
 namespace kilvo {
+
+class VoxelMap;
 
 /// What the estimator knows when an image comes.
 struct ImageContext {

@@ -54,8 +54,7 @@ void Examination::find(Finding finding) {
 }
 
 void Examination::find_offset(Sensor sensor, double offset, double sigma, const std::string& evidence) {
-  const double offsets[] = {robot_.imu.time_offset, robot_.legs.time_offset, robot_.lidar.time_offset, robot_.camera.time_offset};
-  const double right = offsets[static_cast<std::size_t>(sensor)] + offset;
+  const double right = time_offsets_of(robot_)[index_of(sensor)] + offset;
   const std::string key = std::string(name_of(sensor)) + ".time_offset";
   Finding f{sensor, fmt::format("{}_clock", name_of(sensor)), {}, {}, {}, offset, fmt::format("s"), {}, true};
   const char* side = offset > 0 ? "early" : "late";
@@ -95,10 +94,9 @@ void Examination::refine_rotation(Sensor sensor, const std::string& what, const 
 
 void Examination::refine_offset(Sensor sensor, double offset, double sigma, double method) {
   constexpr double largest = 0.002;  // s
-  const double offsets[] = {original_.imu.time_offset, original_.legs.time_offset, original_.lidar.time_offset,
-                            original_.camera.time_offset};
   Refinement r = refinement(sensor, fmt::format("clock of the {}", name_of(sensor)), {offset}, {sigma}, method, largest, fmt::format("s"));
-  r.changes = {{fmt::format("{}.time_offset", name_of(sensor)), fmt::format("{:.5f}", offsets[static_cast<std::size_t>(sensor)] + offset)}};
+  r.changes = {
+      {fmt::format("{}.time_offset", name_of(sensor)), fmt::format("{:.5f}", time_offsets_of(original_)[index_of(sensor)] + offset)}};
   refinements_.push_back(std::move(r));
 }
 

@@ -41,7 +41,7 @@ bool is_identity(const Eigen::Matrix3d& m) { return m.isApprox(Eigen::Matrix3d::
 }  // namespace
 
 void Examination::examine_rates() {
-  const double nominal[] = {robot_.imu.rate, robot_.legs.rate, robot_.lidar.rate, robot_.camera.rate};
+  const auto nominal = rates_of(robot_);
   for (std::size_t i = 0; i < sensor_count; ++i) {
     const StampStatistics& s = recorded_.stamps[i];
     const auto sensor = static_cast<Sensor>(i);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 
 #include "lab/messages/compressed_image.hpp"
 #include "lab/messages/inertial_and_joints.hpp"
@@ -52,9 +53,7 @@ bool is_type_of(Sensor sensor, std::string_view type) { return std::ranges::coun
 
 std::vector<Sensor> sensors_of_type(std::string_view type) {
   std::vector<Sensor> sensors;
-  for (int i = 0; i < sensor_count; ++i) {
-    if (is_type_of(static_cast<Sensor>(i), type)) sensors.push_back(static_cast<Sensor>(i));
-  }
+  std::ranges::copy_if(all_sensors, std::back_inserter(sensors), [type](Sensor s) { return is_type_of(s, type); });
   return sensors;
 }
 

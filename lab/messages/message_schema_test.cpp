@@ -49,7 +49,7 @@ TEST(MessageSchema, AgreesWithTheFieldsThatWeReadAndWrite) {
 }
 
 TEST(MessageSchema, SumsAreThoseOfRos) {
-  for (const Sensor sensor : {Sensor::imu, Sensor::legs, Sensor::lidar, Sensor::camera}) {
+  for (const Sensor sensor : all_sensors) {
     const auto& type = written_type(sensor);
     EXPECT_EQ(schema_of(type.name).md5(), type.md5sum) << type.name;
   }

@@ -86,8 +86,7 @@ std::vector<TopicDescription> list_topics(const RecordingReader& reader) {
 }
 
 void mark_used(RecordingDescription& description, const RecordingReader& reader, const RecordingOptions& options) {
-  for (int i = 0; i < sensor_count; ++i) {
-    const auto sensor = static_cast<Sensor>(i);
+  for (const Sensor sensor : all_sensors) {
     if (options[sensor].topic.empty()) continue;
     try {
       const auto chosen = choose_topic(reader.connections(), sensor, options[sensor].topic);

@@ -35,12 +35,11 @@ std::optional<PointTimeFormat> find_point_time(RecordingReader& reader, const Ch
 
 RecordingSource::RecordingSource(const std::vector<std::filesystem::path>& inputs, RecordingOptions options)
     : reader_(open_recordings(inputs)), options_(std::move(options)) {
-  for (int i = 0; i < sensor_count; ++i) {
-    const auto sensor = static_cast<Sensor>(i);
+  for (const Sensor sensor : all_sensors) {
     if (!options_[sensor].use) continue;
-    intakes_[static_cast<std::size_t>(i)] = SensorIntake(options_[sensor].time_offset, options_.with_colours);
+    intakes_[index_of(sensor)] = SensorIntake(options_[sensor].time_offset, options_.with_colours);
     try {
-      chosen_[static_cast<std::size_t>(i)] = choose_topic(reader_->connections(), sensor, options_[sensor].topic);
+      chosen_[index_of(sensor)] = choose_topic(reader_->connections(), sensor, options_[sensor].topic);
     } catch (const InputError& error) {
       throw InputError(reader_->name() + ": " + error.what());
     }
@@ -76,7 +75,7 @@ std::optional<Measurement> RecordingSource::decode(Sensor sensor, const RawMessa
 std::optional<Measurement> RecordingSource::next() {
   while (true) {
     for (; message_ && next_sensor_ < sensor_count; ++next_sensor_) {
-      const ChosenTopic& chosen = chosen_[static_cast<std::size_t>(next_sensor_)];
+      const ChosenTopic& chosen = chosen_[next_sensor_];
       if (message_->connection->topic != chosen.topic || message_->connection->type != chosen.type) continue;
       if (auto measurement = decode(static_cast<Sensor>(next_sensor_), *message_)) {
         ++next_sensor_;

@@ -77,7 +77,7 @@ class RecordingSource final : public MeasurementSource {
   PointTimeFormat point_time_;
   std::array<SensorIntake, sensor_count> intakes_;
   std::optional<RawMessage> message_;  // read last
-  int next_sensor_ = 0;                // that it has not been decoded for
+  std::size_t next_sensor_ = 0;        // that it has not been decoded for
   Time recorded_{};
 };
 

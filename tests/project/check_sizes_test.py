@@ -22,6 +22,11 @@ class CheckSizes(PlantedTree):
         self.assert_clean({"kilvo/map/new.cpp": "\n" * 300})
         self.assert_found({"kilvo/map/new.cpp": "\n" * 301}, "kilvo/map/new.cpp:300: the file has 301 lines, at most 300")
 
+    def test_too_many_includes(self):
+        includes = [f'#include "kilvo/math/x{i}.hpp"\n' for i in range(13)]
+        self.assert_clean({"kilvo/map/new.cpp": "#include <cmath>\n" + "".join(includes[:12]), "lab/report/new.cpp": "".join(includes)})
+        self.assert_found({"kilvo/map/new.cpp": "".join(includes)}, "kilvo/map/new.cpp: the file includes 13 of ours, at most 12")
+
     def test_test_file_too_long(self):
         self.assert_clean({"kilvo/map/new_test.cpp": "\n" * 500, "tests/stories/new.cpp": "\n" * 500})
         self.assert_found({"kilvo/map/new_test.cpp": "\n" * 501}, "kilvo/map/new_test.cpp:500: the file has 501 lines, at most 500")
