@@ -146,7 +146,7 @@ void move_stance(Estimate& e, std::size_t side, const Stance& foot) {
   e.P.middleRows<3>(pc) += moved.transpose();
   moved.middleRows<3>(pc) = e.P.block<3, 3>(pc, at::R) * J.transpose();
   e.P.middleCols<3>(pc) += moved;
-  e.P.block<2, 2>(pc, pc).diagonal().array() += foot.settled2;
+  e.P.block<2, 2>(pc, pc).diagonal().array() += foot.slide_variance;
 }
 
 void place_stances(State& x, const LegStep& step) {

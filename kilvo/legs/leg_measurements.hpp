@@ -23,7 +23,7 @@ struct Stance {
   bool used = false;                                     // it stands: rows are made of it
   SolePoint point;                                       // on which it stands; IMU frame
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();       // from where the point was in the sole before to where it is now; IMU frame, m
-  double settled2 = 0;                                   // variance of its slide along the ground since the sample before, m^2
+  double slide_variance = 0;                             // along the ground since the sample before, m^2
   double variance_scale = 1;                             // factor on the variance of its rows (Eq. 8)
   std::optional<Eigen::Matrix<double, 7, 1>> row_scale;  // another one on that of each: velocity, position, height
   SO3 R_IF;

@@ -281,7 +281,7 @@ TEST(LegMeasurements, WhatAFootMayHaveSlidIsInTheVarianceOfItsContactPositionAlo
   Estimate e;
   e.P.setIdentity();
   Stance foot;
-  foot.settled2 = 1e-4;
+  foot.slide_variance = 1e-4;
   move_stance(e, 1, foot);
   Covariance expected = Covariance::Identity();
   expected.diagonal().segment<2>(at::pcr).array() += 1e-4;

@@ -33,9 +33,8 @@ LegPipeline::LegUpdate LegPipeline::measure(Feet feet, const Estimate& predicted
   Stopwatch watch;
   contacts_.update(feet, x, omega, imu.accel - x.ba, sigma_v, map);
   out.contact_us = watch.lap_us();
-  stances_.set_on_legs_alone(on_legs_alone);
   for (std::size_t side = 0; side < 2; ++side) level_ground_.stands_at(side, x.pc[side]);
-  out.step = stances_.step(feet, contacts_.contacts(), x, omega, sigma_v, map, ground);
+  out.step = stances_.step(feet, contacts_.contacts(), x, omega, sigma_v, {map, ground, on_legs_alone});
   if (has_level_ground_) find_level_ground(out.step, predicted, ground);
   contacts_.adapt(out.step, x, imu.gyro, ground);
   // As the filter sees it: the standing feet by their weights.

@@ -11,8 +11,8 @@ constexpr double prior_averages = 3, memory_averages = 15;
 constexpr double first_guess = 0.1;
 // The state follows the sole in part, so that less is seen than there is; and what is alike at all steps does not average out.
 constexpr double common = 2;
-// Two stances beyond three standard deviations of the noise need no more.
-constexpr double gate2 = 3;
+// Two stances whose squares both exceed this many variances of the noise need no more.
+constexpr double surely = 3;
 
 }  // namespace
 
@@ -53,7 +53,7 @@ void SoleNoise::add_rise(std::size_t side, double up, double variance_v) {
   const double both = up * *other, noise2 = vertical() * vertical();
   upwards_.add(0.5 * (up - *other) * (up - *other), 1);
   alike_.add(both, 1);
-  const double at_once = both > 0 ? std::min(up * up, *other * *other) - gate2 * noise2 : 0;
+  const double at_once = both > 0 ? std::min(up * up, *other * *other) - surely * noise2 : 0;
   const double beyond = std::max(alike_.mean(), at_once) - variance_v;
   if (beyond > 0) rise_ = std::sqrt(beyond);
 }

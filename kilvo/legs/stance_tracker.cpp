@@ -162,7 +162,7 @@ bool StanceTracker::stuck(std::size_t side, const Feet& feet, const Eigen::Vecto
 }
 
 LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v,
-                            const VoxelMap* map, Ground ground) {
+                            const Support& support) {
   LegStep out;
   out.t = feet.t;
   out.dt = last_ ? std::clamp(to_seconds(feet.t - *last_), shortest_step, longest_step) : longest_step;
@@ -194,17 +194,17 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
       if (!foot.begins) foot.shift += (weights[k] - (*weights_[side])[k]) * pose.p[k];
     }
     weights_[side] = weights;
-    if (foot.begins && has_heights_) add_ground(side, foot, x, map, contacts.normal, ground);
+    if (foot.begins && has_heights_) add_ground(side, foot, x, support.map, contacts.normal, support.ground);
     // Eq. 8: what moves is believed less; so is what has just arrived.
     const Eigen::Vector3d velocity = velocity_W(x, foot.point.p, foot.point.v, omega);
     const double moving2 = velocity.squaredNorm();
     if (phase > config_.entry_delay + entry_time)
       noise_.add(side, velocity, -x.g.normalized(), out.dt,
-                 on_legs_alone_ ? std::optional(std::hypot(sigma_v, described_share * x.v.norm())) : std::nullopt);
+                 support.on_legs_alone ? std::optional(std::hypot(sigma_v, described_share * x.v.norm())) : std::nullopt);
     const double noise2 = out.velocity_sigma * out.velocity_sigma + sigma_v * sigma_v;
     const double entering = std::clamp(1.0 - (phase - config_.entry_delay) / entry_time, 0.0, 1.0);
     // What still slides as it comes down takes its contact position along. Later only an error of the state would seem to slide for long.
-    if (entering > 0) foot.settled2 = moving2 * entry_time * out.dt;
+    if (entering > 0) foot.slide_variance = moving2 * entry_time * out.dt;
     // As much as the noise across on all three axes is no motion.
     const bool by_foot = adapts_ && !by_row_;
     const double loose = 1.0 + (by_foot ? std::max(0.0, moving2 / noise2 - 3.0) : 0.0) + (loosest - 1) * entering;

@@ -23,12 +23,15 @@ class StanceTracker {
   /// Whether the map's ground holds the feet, or how they stand on it is learned, since the height is known better without.
   enum class Ground : std::uint8_t { use, learn };
 
-  /// `omega`: bias-free, rad/s. `sigma_v`: uncertainty of the velocity of x, m/s. `map`: on whose planes the feet come down.
+  struct Support {
+    const VoxelMap* map;  // on whose planes the feet come down
+    Ground ground;
+    bool on_legs_alone;  // nothing else measures the velocity: what both soles seem to do is an error of the state
+  };
+  /// `omega`: bias-free, rad/s. `sigma_v`: uncertainty of the velocity of x, m/s.
   LegStep step(const Feet& feet, const Contacts& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v = 0,
-               const VoxelMap* map = nullptr, Ground ground = Ground::use);
+               const Support& support = {nullptr, Ground::use, false});
 
-  /// Whether nothing but the legs measures the velocity: what both soles seem to do is an error of the state then.
-  void set_on_legs_alone(bool alone) { on_legs_alone_ = alone; }
   /// Both feet leave the filter at the next step, to enter anew.
   void restart();
   /// Which feet's rows were within their gates of the last step. A foot that is beyond for a while has slipped: it enters anew, where it
@@ -55,7 +58,6 @@ class StanceTracker {
   std::array<FootPose, 2> last_pose_;
   std::array<Time, 2> changed_{};  // when the encoders of the foot last said something new
   SoleNoise noise_;
-  bool on_legs_alone_ = false;
   bool adapts_, by_row_, has_heights_, by_contacts_;  // of the settings
   GroundLookup places_;                               // of the touchdowns
   StandingRate standing_rate_;

@@ -108,8 +108,8 @@ TEST(StanceTracker, AFootThatStillSlidesAsItEntersTakesItsContactPositionAlongAn
     contacts.t = feet.t;
     contacts.since = {test::gait_begin, test::gait_begin - std::chrono::seconds(1)};
     const LegStep step = tracker.step(feet, contacts, body, Eigen::Vector3d::Zero());
-    (contacts.phase(0) < config.entry_delay + 0.02 ? entering : later) += step.foot[0].settled2;
-    EXPECT_EQ(step.foot[1].settled2, 0);
+    (contacts.phase(0) < config.entry_delay + 0.02 ? entering : later) += step.foot[0].slide_variance;
+    EXPECT_EQ(step.foot[1].slide_variance, 0);
   }
   EXPECT_NEAR(std::sqrt(entering), sliding * 0.02, 0.1 * sliding * 0.02) << "as far as it slides at this speed while it enters";
   EXPECT_EQ(later, 0) << "or a wrong velocity of the state would take it along";
@@ -216,7 +216,8 @@ TEST(StanceTracker, TheGroundCountsOnceAtEachTouchdownAndOnlyWhereThereIsAMap) {
       const double s = 1e-3 * i;
       const Feet feet = gait.feet(s);
       contacts.update(feet, gait.body(s), Eigen::Vector3d::Zero(), level_imu.accel);
-      const LegStep step = tracker.step(feet, contacts.contacts(), gait.body(s), Eigen::Vector3d::Zero(), 0, ground);
+      const LegStep step =
+          tracker.step(feet, contacts.contacts(), gait.body(s), Eigen::Vector3d::Zero(), 0, {ground, StanceTracker::Ground::use, false});
       for (const Stance& foot : step.foot) {
         entered += foot.begins ? 1 : 0;
         with_ground += foot.ground ? 1 : 0;

@@ -63,11 +63,11 @@ void LidarPipeline::note_silence(Duration silence) {
   if (is_silence(silence, mount_.rate)) sweeps_to_go_ = std::max(sweeps_to_go_, consistent_sweeps);
 }
 
-Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory,
-                                    const ProcessNoise& noise, const VoxelMap& map, const PoseCovariance& map_error, PointDrops& drops) {
+Registration LidarPipeline::measure(const LidarScan& scan, const Context& context, const VoxelMap& map, PointDrops& drops) {
+  const Estimate& prior = context.prior;
   Registration out;
   out.posterior = prior;
-  out.points = undistort(scan, trajectory, prior.t, mount_, drops);
+  out.points = undistort(scan, context.trajectory, prior.t, mount_, drops);
   if (out.points.empty()) {
     out.refused = Reason::no_usable_point;
     return out;
@@ -80,11 +80,11 @@ Registration LidarPipeline::measure(const LidarScan& scan, Time end, const Estim
   // With hysteresis: each change of mind would hand what was drifted since to the map.
   constexpr double to_leave = 3.0;
   if (is_blind_somewhere()) config.weak_share *= to_leave;
-  LidarModel model(map, out.clusters, mount_.T_imu_lidar.p, map_error, config, workers_);
+  LidarModel model(map, out.clusters, mount_.T_imu_lidar.p, context.map_error, config, workers_);
   if (map.empty()) {
     out.carries = true;
   } else {
-    const UndistortionNoise within_scan = undistortion_noise(noise, end - prior.t);
+    const UndistortionNoise within_scan = undistortion_noise(context.noise, context.end - prior.t);
     out.searched = needs_search(prior.P, PoseCovariance::Identity() - unknowable_);
     if (out.searched) {
       search(map, prior, model, within_scan, out);

@@ -52,10 +52,16 @@ class LidarPipeline {
   /// A sweep begins so long after the last one that was used.
   void note_silence(Duration silence);
 
-  /// `scan` lasts until `end`. `prior`: at the scan's middle. `trajectory`: covers the scan, with the IMU's `noise`. `map_error`: of the
-  /// map around the prior. An empty map takes the sweep as it is. `drops`: counts the points that are not used.
-  Registration measure(const LidarScan& scan, Time end, const Estimate& prior, const Trajectory& trajectory, const ProcessNoise& noise,
-                       const VoxelMap& map, const PoseCovariance& map_error, PointDrops& drops);
+  /// What the estimator knows when a sweep comes.
+  struct Context {
+    Time end;                         // of the sweep
+    const Estimate& prior;            // at its middle
+    const Trajectory& trajectory;     // covers it
+    const ProcessNoise& noise;        // of the IMU within it
+    const PoseCovariance& map_error;  // of the map around the prior
+  };
+  /// An empty map takes the sweep as it is. `drops`: counts the points that are not used.
+  Registration measure(const LidarScan& scan, const Context& context, const VoxelMap& map, PointDrops& drops);
 
   /// The sweep was registered much farther from `prior` than the covariance says and than sweeps usually are, and those before it were not.
   /// `map_error`: of the map around the prior.

@@ -59,7 +59,7 @@ struct Standing {
   }
   Registration measured(const VoxelMap& map, const Estimate& prior) {
     PointDrops drops;
-    return pipeline.measure(scan, end, prior, trajectory, ProcessNoise{}, map, no_error(), drops);
+    return pipeline.measure(scan, {end, prior, trajectory, ProcessNoise{}, no_error()}, map, drops);
   }
   VoxelMap whole() const { return test::exact_map(room.surfaces(), SE3()); }
 };
