@@ -171,12 +171,7 @@ void Findings::contradict(Reason reason, Sensor a, Sensor b, double value, const
 }
 
 void Findings::look_at_agreement(Time t, const Situation& now) {
-  if (agreement_looked_at_ == Time{}) {
-    first_ba_ = now.estimate.x.ba;
-    first_bg_ = now.estimate.x.bg;
-    agreement_looked_at_ = t;
-    return;
-  }
+  if (agreement_looked_at_ == Time{}) agreement_looked_at_ = t;
   judge_speed(now);
   judge_biases(now);
   if (t - agreement_looked_at_ < remembered) return;
@@ -197,6 +192,13 @@ void Findings::judge_speed(const Situation& now) {
 }
 
 void Findings::judge_biases(const Situation& now) {
+  // Those of a start on the move are a guess.
+  if (!are_biases_known_) {
+    const auto sigma = [&now](int part) { return std::sqrt(std::max(0.0, now.estimate.P.diagonal().segment<3>(part).maxCoeff())); };
+    first_ba_ = now.estimate.x.ba;
+    first_bg_ = now.estimate.x.bg;
+    are_biases_known_ = 5 * sigma(at::ba) < strange_accel && 5 * sigma(at::bg) < strange_gyro;
+  }
   const double accel = (now.estimate.x.ba - first_ba_).norm(), gyro = (now.estimate.x.bg - first_bg_).norm();
   const bool impossible = accel > impossible_accel || gyro > impossible_gyro;
   if (impossible ? statistics_.diverged : (strange_biases_ || (accel < strange_accel && gyro < strange_gyro))) return;

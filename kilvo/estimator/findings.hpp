@@ -85,7 +85,7 @@ class Findings {
   Use used_before_;
   Time streams_looked_at_{}, use_looked_at_{}, agreement_looked_at_{};
   Eigen::Vector3d first_ba_ = Eigen::Vector3d::Zero(), first_bg_ = Eigen::Vector3d::Zero();
-  bool strange_biases_ = false;
+  bool are_biases_known_ = false, strange_biases_ = false;
   std::uint64_t lost_stances_before_ = 0;
 };
 

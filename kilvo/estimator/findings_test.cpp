@@ -76,6 +76,22 @@ TEST_F(Judged, SweepsThatFitNowhereAreEvidence) {
   EXPECT_THAT(warnings(), testing::Contains(AllOf(HasSubstr("the LiDAR and the legs contradict each other"), HasSubstr("most sweeps"))));
 }
 
+TEST_F(Judged, BiasesThatWereAGuessMayChangeAndThoseThatAreKnownMayNot) {
+  const auto walk_with = [this](double seconds, double sigma, const Eigen::Vector3d& ba) {
+    const auto edit = [&] {
+      estimate_.P.diagonal().segment<3>(at::ba).setConstant(sigma * sigma);
+      estimate_.x.ba = ba;
+    };
+    walk(seconds, edit, 0);
+  };
+  for (double sigma = 0.4; sigma > 0.07; sigma /= 2) walk_with(1, sigma, {sigma, -sigma, 0.5});
+  walk_with(5, 0.02, {0, 0, 0.1});
+  EXPECT_THAT(warnings(), IsEmpty());
+  walk_with(1, 0.02, {0.35, 0, 0.1});
+  EXPECT_THAT(warnings(), testing::Contains(AllOf(HasSubstr("the IMU and the LiDAR contradict each other"), HasSubstr("biases"))));
+  EXPECT_FALSE(diverged());
+}
+
 TEST_F(Judged, ASpeedThatNobodyWalksIsEvidence) {
   walk(3, [this] { estimate_.x.v = {8.3, 0, 0}; });
   EXPECT_TRUE(diverged());
