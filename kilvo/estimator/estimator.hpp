@@ -15,6 +15,7 @@
 #include "kilvo/estimator/frame_queue.hpp"
 #include "kilvo/estimator/history.hpp"
 #include "kilvo/estimator/imu_watch.hpp"
+#include "kilvo/estimator/moving_start.hpp"
 #include "kilvo/estimator/output_queue.hpp"
 #include "kilvo/estimator/sensor_status.hpp"
 #include "kilvo/estimator/starter.hpp"
@@ -97,6 +98,7 @@ class Estimator {
   std::unique_ptr<LegKinematics> kinematics_;
   LegPipeline legs_;
   LidarPipeline lidar_;
+  std::optional<MovingStart> moving_start_;
   std::optional<VisualPipeline> vision_;
   WorldMap map_;
   FrameQueue frames_;

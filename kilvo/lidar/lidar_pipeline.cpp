@@ -55,10 +55,6 @@ bool contradicts_map(const RegistrationReport& report) {
 LidarPipeline::LidarPipeline(const LidarMount& mount, const LidarConfig& config, const UpdateConfig& update, int threads)
     : mount_(mount), config_(config), update_(update), workers_(threads) {}
 
-bool LidarPipeline::has_shape(Time end, const Estimate& prior) const {
-  return end >= begins_at_ || prior.P.diagonal().segment<3>(at::v).maxCoeff() <= known_velocity * known_velocity;
-}
-
 void LidarPipeline::note_silence(Duration silence) {
   if (is_silence(silence, mount_.rate)) sweeps_to_go_ = std::max(sweeps_to_go_, consistent_sweeps);
 }

@@ -47,7 +47,10 @@ class LidarPipeline {
     begins_at_ = t;
     mount_error_.begin_at(T_WI);
   }
-  bool has_shape(Time end, const Estimate& prior) const;
+  bool has_shape(Time end, const Estimate& prior) const { return end >= begins_at_ || has_known_velocity(prior); }
+  static bool has_known_velocity(const Estimate& e) {
+    return e.P.diagonal().segment<3>(at::v).maxCoeff() <= known_velocity * known_velocity;
+  }
 
   /// A sweep begins so long after the last one that was used.
   void note_silence(Duration silence);
