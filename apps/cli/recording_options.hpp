@@ -7,9 +7,9 @@
 
 namespace kilvo::cli {
 
-/// All of it.
+/// The whole recording.
 lab::RecordingOptions recording_options(const lab::Settings& settings, const std::vector<Sensor>& used);
-/// What is asked for.
+/// What the options ask for of it.
 lab::RecordingOptions recording_options(const RunOptions& options, const lab::Settings& settings, const std::vector<Sensor>& used);
 
 }  // namespace kilvo::cli

@@ -9,14 +9,6 @@
 #include "kilvo/legs/leg_kinematics.hpp"
 
 namespace kilvo {
-namespace {
-
-// What the filter's covariance lacks of the error relative to the first pose: of the map, of the LiDAR's mount, of the legs' description.
-PoseCovariance common_error(const WorldMap& map, const LidarPipeline& lidar, const LegPipeline& legs, const State& x) {
-  return map.error_at(x.pose()) + lidar.mount_error_at(x.pose()) + legs.description_error(x);
-}
-
-}  // namespace
 
 Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::array<bool, sensor_count> used)
     : config_(config),
@@ -102,9 +94,10 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   history_.begin(start.estimate, input_.uses(Sensor::lidar) ? std::nullopt : start.rest_until);
   status_.begin(t, input_.used());
   // On the move the first sweeps find the velocity, and the legs tell it within a step.
-  constexpr Duration to_settle = std::chrono::seconds(2), a_step = std::chrono::seconds(1);
-  if (vision_) vision_->begin_at(start.still ? t : t + to_settle);
+  constexpr Duration a_step = std::chrono::seconds(1);
+  if (vision_) vision_->begin_at(start.still ? t : t + longest_moving_start);
   lidar_.begin_at(start.still || !input_.uses(Sensor::legs) ? t : t + a_step, start.estimate.x.pose());
+  if (!start.still && !map_.is_given()) moving_start_.emplace(input_.robot().lidar, config_, start.estimate);
   if (!start.still) findings_.report(situation(), {}, Reason::moving_start);
   const double norm = start.resting_norm * start.accel_scale;
   if (std::abs(norm - standard_gravity) > 0.1 * standard_gravity)
@@ -175,6 +168,11 @@ Findings::Situation Estimator::situation() const {
           legs_.leg_length()};
 }
 
+PoseCovariance Estimator::common_error(const State& x) const {
+  const PoseCovariance error = map_.error_at(x.pose()) + lidar_.mount_error_at(x.pose()) + legs_.description_error(x);
+  return moving_start_ ? PoseCovariance(error + moving_start_->error_at(x.pose())) : error;
+}
+
 void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts, double kinematic_us,
                      double contact_us) {
   Output* const o = outputs_.next(e.t, out);
@@ -182,7 +180,7 @@ void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<
   o->epoch = epoch();
   o->x = e.x;
   o->P = e.P;
-  o->P.topLeftCorner<6, 6>() += common_error(map_, lidar_, legs_, e.x);
+  o->P.topLeftCorner<6, 6>() += common_error(e.x);
   if (history_.replay().has_imu()) o->omega = history_.replay().newest_imu().gyro - e.x.bg;
   o->modality = status_.modality();
   o->cause = status_.cause();
@@ -195,7 +193,7 @@ void Estimator::emit(const Estimate& e, std::vector<Output>& out, std::optional<
 
 bool Estimator::fork(LivePropagator& into) const {
   if (!history_.has_begun() || !history_.replay().has_imu()) return false;
-  into.become(history_, legs_, imu_, status_, common_error(map_, lidar_, legs_, history_.now().x), epoch());
+  into.become(history_, legs_, imu_, status_, common_error(history_.now().x), epoch());
   return true;
 }
 

@@ -87,6 +87,9 @@ class Estimator {
   void choose_modality(Time t);
   bool keep_plausible(bool definite = false);  // `definite`: looks at the whole covariance
   Findings::Situation situation() const;
+  // What the filter's covariance lacks of the error relative to the first pose: of the map or of where it began, of the LiDAR's mount, of
+  // the legs' description.
+  PoseCovariance common_error(const State& x) const;
   void emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0,
             double contact_us = 0);
 

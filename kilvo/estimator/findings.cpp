@@ -192,19 +192,22 @@ void Findings::judge_speed(const Situation& now) {
 }
 
 void Findings::judge_biases(const Situation& now) {
-  // Those of a start on the move are a guess.
-  if (!are_biases_known_) {
-    const auto sigma = [&now](int part) { return std::sqrt(std::max(0.0, now.estimate.P.diagonal().segment<3>(part).maxCoeff())); };
-    first_ba_ = now.estimate.x.ba;
-    first_bg_ = now.estimate.x.bg;
-    are_biases_known_ = 5 * sigma(at::ba) < strange_accel && 5 * sigma(at::bg) < strange_gyro;
-  }
-  const double accel = (now.estimate.x.ba - first_ba_).norm(), gyro = (now.estimate.x.bg - first_bg_).norm();
-  const bool impossible = accel > impossible_accel || gyro > impossible_gyro;
-  if (impossible ? statistics_.diverged : (strange_biases_ || (accel < strange_accel && gyro < strange_gyro))) return;
+  const auto sigma = [&now](int part) { return std::sqrt(std::max(0.0, now.estimate.P.diagonal().segment<3>(part).maxCoeff())); };
+  const Biases present = {now.estimate.x.ba, now.estimate.x.bg};
+  if (!first_biases_) first_biases_ = present;
+  // Those of a start on the move are a guess: they may change, but not by anything.
+  if (!known_biases_ && 5 * sigma(at::ba) < strange_accel && 5 * sigma(at::bg) < strange_gyro) known_biases_ = present;
+  const auto beyond = [&present](const Biases& before, double accel, double gyro) {
+    return (present.accel - before.accel).norm() > accel || (present.gyro - before.gyro).norm() > gyro;
+  };
+  const bool impossible = beyond(*first_biases_, impossible_accel, impossible_gyro);
+  const bool strange = known_biases_ && beyond(*known_biases_, strange_accel, strange_gyro);
+  if (impossible ? statistics_.diverged : (strange_biases_ || !strange)) return;
   strange_biases_ = true;
-  const std::string why = "the biases that would reconcile them have changed since the start by " + decimals(accel, 2) + " m/s^2 and " +
-                          decimals(gyro, 3) + " rad/s: is the mount right?";
+  const Biases& before = impossible ? *first_biases_ : *known_biases_;
+  const double accel = (present.accel - before.accel).norm();
+  const std::string why = "the biases that would reconcile them have changed by " + decimals(accel, 2) + " m/s^2 and " +
+                          decimals((present.gyro - before.gyro).norm(), 3) + " rad/s: is the mount right?";
   contradict(impossible ? Reason::diverged : Reason::inconsistent, Sensor::imu, has_lidar(now.modality) ? Sensor::lidar : Sensor::legs,
              accel, why, now);
 }

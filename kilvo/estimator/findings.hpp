@@ -84,8 +84,11 @@ class Findings {
   std::array<std::array<std::uint64_t, reason_count>, sensor_count> drops_{};  // by Sensor and Reason
   Use used_before_;
   Time streams_looked_at_{}, use_looked_at_{}, agreement_looked_at_{};
-  Eigen::Vector3d first_ba_ = Eigen::Vector3d::Zero(), first_bg_ = Eigen::Vector3d::Zero();
-  bool are_biases_known_ = false, strange_biases_ = false;
+  struct Biases {
+    Eigen::Vector3d accel, gyro;  // m/s^2, rad/s
+  };
+  std::optional<Biases> first_biases_, known_biases_;  // at the start; when they were known
+  bool strange_biases_ = false;
   std::uint64_t lost_stances_before_ = 0;
 };
 

@@ -7,8 +7,6 @@
 namespace kilvo {
 namespace {
 
-// theta_d: an acceleration so many standard deviations from its usual is an impact.
-constexpr double unusual_acceleration = 10;
 // Of each axis of an accelerometer for robots, m/s^2; on all three at once it is the square root of three times as much.
 constexpr double usual_range = 16 * standard_gravity;
 
@@ -17,7 +15,7 @@ constexpr double usual_range = 16 * standard_gravity;
 ImuWatch::ImuWatch(const ImuMount& mount, const InitialConfig& config)
     : absurd_accel_(1.8 * std::max(mount.accel_range, usual_range)),
       clipping_(mount.gyro_range, mount.accel_range),
-      stationarity_(config.still_gyro, config.still_accel, unusual_acceleration) {}
+      stationarity_(config.still_gyro, config.still_accel, unusual_deviation) {}
 
 std::optional<Reason> ImuWatch::prepare(ImuSample& s) {
   s.accel *= accel_scale_;

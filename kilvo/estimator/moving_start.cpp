@@ -2,12 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "kilvo/input/timeline.hpp"
 
 namespace kilvo {
 namespace {
+
+// Within one a walking robot smears a surface by no more than it is rough.
+constexpr double parts_of_a_sweep = 4;
+// By so much better than has a shape a sweep's velocity is known in the end: it smears by less than a millimetre.
+constexpr double well_known = 8;
 
 std::vector<LidarScan> parts_of(const LidarScan& scan, Duration length) {
   const Time begin = begin_of(scan);
@@ -34,34 +40,44 @@ MovingStart::MovingStart(const LidarMount& mount, const EstimatorConfig& config,
       lidar_(mount, config.lidar, config.update, config.threads),
       map_(config.map, config.lidar, mount.T_imu_lidar.p) {}
 
-void MovingStart::register_part(const LidarScan& part, History& history) {
+void MovingStart::begin_map(Estimate& e) {
+  const PoseCovariance error = map_.error_at(e.x.pose()) + e.P.topLeftCorner<6, 6>();
+  lidar_ = LidarPipeline(mount_, config_.lidar, config_.update, config_.threads);
+  map_ = WorldMap(config_.map, config_.lidar, mount_.T_imu_lidar.p);
+  map_.begin_at(e.x.pose(), error);
+  for (const int part : {at::R, at::p}) make_independent(e.P, part, start_.P.block<3, 3>(part, part));
+}
+
+bool MovingStart::register_part(const LidarScan& part, History& history, PointDrops& drops) {
   const Time begin = begin_of(part), end = end_of(part);
-  if (begin < history.base().t) return;
+  if (begin < history.base().t) return false;
   Estimate prior = history.at(end - (end - begin) / 2);
   history.record_from(prior, end);
-  PointDrops drops;
+  if (map_.surfaces().empty()) begin_map(prior);
   const Registration sweep = map_.register_sweep(lidar_, part, end, history, prior, drops);
-  if (sweep.refused) return;
+  if (sweep.refused || !is_plausible(sweep.posterior) || !is_definite(sweep.posterior.P)) return false;
   history.correct_trajectory(sweep.posterior, sweep.posterior.x.v - prior.x.v);
   lidar_.accept(sweep);
   map_.learn(sweep, lidar_.unobservable(), true);
   history.rebase(sweep.posterior);
+  return true;
 }
 
-void MovingStart::add(const LidarScan& scan, History& history) {
-  const Duration length = std::max<Duration>(std::chrono::milliseconds(1), from_seconds(0.25 / mount_.rate));
-  for (const LidarScan& part : parts_of(scan, length)) register_part(part, history);
+bool MovingStart::add(const LidarScan& scan, History& history, PointDrops& drops) {
+  if (!first_sweep_) first_sweep_ = begin_of(scan);
+  const Duration length = std::max<Duration>(std::chrono::milliseconds(1), from_seconds(1 / (parts_of_a_sweep * mount_.rate)));
+  bool any = false;
+  for (const LidarScan& part : parts_of(scan, length)) any = register_part(part, history, drops) || any;
   Estimate e = history.base();
   const Eigen::Matrix3d of_velocity = e.P.block<3, 3>(at::v, at::v);
-  const double sigma = std::sqrt(of_velocity.diagonal().maxCoeff());
-  is_over_ = 8 * sigma < known_velocity || end_of(scan) - start_.t > std::chrono::seconds(2);
-  const bool begins_anew = is_over_ || (!is_roughly_known_ && sigma < known_velocity);
+  const double sigma = std::sqrt(std::max(0.0, of_velocity.diagonal().maxCoeff()));
+  const bool was_roughly_known = std::exchange(is_roughly_known_, sigma < known_velocity);
+  const bool is_known = was_roughly_known && well_known * sigma < known_velocity;
+  is_over_ = is_known || end_of(scan) - *first_sweep_ > longest_moving_start;
+  const bool begins_anew = is_over_ || is_roughly_known_ != was_roughly_known;
   if (begins_anew) {
-    e.P = start_.P;
-    // Each part is registered to those before: they err alike.
-    make_independent(e.P, at::v, 4 * of_velocity);
-    lidar_ = LidarPipeline(mount_, config_.lidar, config_.update, config_.threads);
-    map_ = WorldMap(config_.map, config_.lidar, mount_.T_imu_lidar.p);
+    begin_map(e);
+    make_independent(e.P, at::v, 4 * of_velocity);  // parts are registered to those before: they err alike
   }
   if (begins_anew || !is_roughly_known_) {
     e.x.g = start_.x.g;
@@ -70,8 +86,8 @@ void MovingStart::add(const LidarScan& scan, History& history) {
     for (const int part : {at::g, at::ba, at::bg}) make_independent(e.P, part, start_.P.block<3, 3>(part, part));
     history.rebase(e);
   }
-  is_roughly_known_ = is_roughly_known_ || begins_anew;
   history.advance_to(end_of(scan));
+  return any;
 }
 
 }  // namespace kilvo

@@ -2,6 +2,8 @@
 // from part to part the robot moves by its velocity. Once that is known, all else begins as if it had been known from the start.
 #pragma once
 
+#include <optional>
+
 #include "kilvo/estimator/history.hpp"
 #include "kilvo/estimator/world_map.hpp"
 #include "kilvo/lidar/lidar_pipeline.hpp"
@@ -9,25 +11,33 @@
 
 namespace kilvo {
 
+/// After so long a start on the move has to do with what it knows.
+inline constexpr Duration longest_moving_start = std::chrono::seconds(2);
+
 class MovingStart {
  public:
-  /// `start`: the first estimate; gravity and biases are guesses.
+  /// `start`: the first estimate, whose gravity and biases are guesses.
   MovingStart(const LidarMount& mount, const EstimatorConfig& config, const Estimate& start);
 
-  /// The parts of the next sweep correct the history, which has come to the sweep's end then.
-  void add(const LidarScan& scan, History& history);
+  /// The parts of the next sweep correct the history, which has come to the sweep's end then. True when any of them was registered.
+  /// `drops`: counts the points that are not used.
+  bool add(const LidarScan& scan, History& history, PointDrops& drops);
   /// The velocity is known, or has not been found for long: gravity and biases are the guesses of the start again, of which parts of sweeps
   /// say too little.
   bool is_over() const { return is_over_; }
+  /// What the covariance of a pose there lacks: it is relative to where the parts' map began, or the robot when it was over.
+  PoseCovariance error_at(const SE3& T_WI) const { return map_.error_at(T_WI); }
 
  private:
-  void register_part(const LidarScan& part, History& history);
+  void begin_map(Estimate& e);
+  bool register_part(const LidarScan& part, History& history, PointDrops& drops);
 
   LidarMount mount_;
   EstimatorConfig config_;
   Estimate start_;
   LidarPipeline lidar_;
   WorldMap map_;
+  std::optional<Time> first_sweep_;
   bool is_over_ = false;
   bool is_roughly_known_ = false;  // the velocity: parts from now on are where they are taken to be, and smear little
 };

@@ -79,8 +79,8 @@ bool SensorStatus::are_legs_lost(Time imu_heard, const Health& health) const {
 }
 
 bool SensorStatus::are_legs_overdue(Time t) const {
-  const double period = std::max(1 / rate_of(Sensor::legs), leg_period_);
-  return t - *last_used(Sensor::legs) >= from_seconds(periods_of_a_gap * period);
+  const Duration due = std::max(from_seconds(periods_of_a_gap / rate_of(Sensor::legs)), from_seconds(periods_of_a_gap * leg_period_));
+  return t - *last_used(Sensor::legs) >= due;
 }
 
 void SensorStatus::lose_imu(const Health& health) {
@@ -103,13 +103,13 @@ SensorStatus::Change SensorStatus::choose(Time t, const Health& health) {
   const bool first = modality_ == Modality::coast && cause_ == Reason::start;
   if (after_outage) cause_ = Reason::imu_back;
   if (changed && !after_outage && !first) cause_ = cause_of_change(*changed, t, health);
-  if (now == modality_) return after_outage || changed ? Change::of_cause : Change::none;
+  if (now == modality_) return after_outage ? Change::of_cause : Change::none;
   modality_ = now;
   return Change::of_modality;
 }
 
 Reason SensorStatus::cause_of_change(Sensor s, Time t, const Health& health) const {
-  static_assert(static_cast<int>(Reason::imu_lost) == 1 && static_cast<int>(Reason::camera_used) == 3 * static_cast<int>(sensor_count));
+  static_assert(static_cast<int>(Reason::imu_lost) == 1 && static_cast<std::size_t>(Reason::camera_useless) == 3 * sensor_count + 1);
   const bool is_back = tracks_[index_of(s)].counts, is_frozen = health.is_frozen(s);
   const auto heard = health.heard(s);
   const bool is_useless = s == Sensor::camera && heard && !is_silence(t - *heard, rate_of(s));

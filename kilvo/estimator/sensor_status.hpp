@@ -51,7 +51,7 @@ class SensorStatus {
   bool imu_lost() const { return imu_lost_; }
 
   enum class Change : std::uint8_t { none, of_cause, of_modality };
-  /// Decides on the modality of `t` from what was used until then. Of the cause alone: the modality is what it was.
+  /// Decides on the modality of `t` from what was used until then. Of the cause alone: the IMU has come back, and nothing else is there.
   Change choose(Time t, const Health& health);
   Modality modality() const { return modality_; }
   Reason cause() const { return cause_; }  // of the last change

@@ -27,10 +27,8 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   if (history_.replay().is_blind(begin, end)) return findings_.drop(Sensor::lidar, Reason::no_imu);
   if (!status_.may_frame_return(Sensor::lidar, end, imu_.is_calm(end))) return findings_.drop(Sensor::lidar, Reason::not_calm);
   if (frames_.last_middle()) lidar_.note_silence(begin - *status_.last_used(Sensor::lidar));
-  if (!moving_start_ && !frames_.last_middle() && !status_.has_legs() && !LidarPipeline::has_known_velocity(history_.base()))
-    moving_start_.emplace(input_.robot().lidar, config_, history_.base());
-  if (moving_start_ && !moving_start_->is_over()) {
-    moving_start_->add(scan, history_);
+  if (moving_start_ && !moving_start_->is_over() && !status_.has_legs()) {
+    if (moving_start_->add(scan, history_, findings_.statistics().points)) status_.use(Sensor::lidar, end);
     keep_plausible(true);
     return findings_.drop(Sensor::lidar, Reason::before_motion);
   }
@@ -73,8 +71,10 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
     history_.correct_trajectory(sweep.posterior, sweep.posterior.x.v - prior.x.v);
     lidar_.accept(sweep);
     if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior);
-    if (first) map_.begin_at(sweep.posterior.x.pose(), legs_.description_error(sweep.posterior.x));
-    map_.learn(sweep, lidar_.unobservable(), lidar_.may_learn(prior, sweep, map_.error_at(prior.x.pose())));
+    if (first) map_.begin_at(T_WI, legs_.description_error(sweep.posterior.x));
+    if (first && moving_start_) map_.begin_at(T_WI, moving_start_->error_at(T_WI));
+    map_.learn(sweep, lidar_.unobservable(), first || lidar_.may_learn(prior, sweep, map_.error_at(prior.x.pose())));
+    moving_start_.reset();
     history_.rebase(sweep.posterior);
   }
   result.stages.map_us = watch.lap_us();

@@ -3,15 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kilvo/filter/stationarity.hpp"
+
 namespace kilvo {
 namespace {
 
 // A foot stands when it is more probable than not.
 constexpr double stands = 0.5;
-constexpr double detection_threshold = 10;  // theta_d
-constexpr double statistics_time = 2.0;     // s, of the acceleration
-constexpr double normal_time = 0.5;         // s, of the ground's normal
-constexpr double sure_of_foot = 0.8;        // of the foot that shows it
+constexpr double statistics_time = 2.0;  // s, of the acceleration
+constexpr double normal_time = 0.5;      // s, of the ground's normal
+constexpr double sure_of_foot = 0.8;     // of the foot that shows it
 
 }  // namespace
 
@@ -67,7 +68,7 @@ void ContactEstimator::report(const Feet& feet, const State& x, const std::array
       ground.point = motion[side].lowest;
     }
     contacts_.clearance[side] = ground.height_of(motion[side].lowest);
-    contacts_.d_fv[side] = detection_threshold * motion[side].speed / (filter_.threshold_speed() * unit);
+    contacts_.d_fv[side] = unusual_deviation * motion[side].speed / (filter_.threshold_speed() * unit);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "kilvo/filter/gap.hpp"
 #include "kilvo/legs/joint_chain.hpp"
 
 namespace kilvo {
@@ -51,11 +52,10 @@ std::optional<std::string> LegKinematics::Chains::look_up_planes(const std::vect
 const std::vector<double>* LegKinematics::Chains::velocity_of(const JointSample& s) {
   if (s.velocity.size() == s.position.size()) return &s.velocity;
   const double dt = to_seconds(s.t - last_t);
-  constexpr double longest = 0.1;      // s
   constexpr double smoothing = 0.001;  // s, of the low pass over the differences
   velocity.resize(s.position.size());
   // Messages without a stamp that are received at once are closer than any encoder sends: their difference is no velocity.
-  const bool known = last_position.size() == s.position.size() && dt > 0.1 * smoothing && dt < longest;
+  const bool known = last_position.size() == s.position.size() && dt > 0.1 * smoothing && dt < blind_gap;
   if (known) {
     const double share = dt / (dt + smoothing);
     for (std::size_t i = 0; i < velocity.size(); ++i) {

@@ -12,7 +12,7 @@
 namespace kilvo {
 
 enum class Reason : std::uint8_t {
-  // of a change of modality: three for each Sensor, in their order
+  // of a change of modality: three for each Sensor, in their order, then the others
   start,
   imu_lost,
   imu_frozen,
