@@ -48,6 +48,23 @@ void MovingStart::begin_map(Estimate& e) {
   for (const int part : {at::R, at::p}) make_independent(e.P, part, start_.P.block<3, 3>(part, part));
 }
 
+void MovingStart::guess_again(Estimate& e) const {
+  e.x.g = start_.x.g;
+  e.x.ba = start_.x.ba;
+  e.x.bg = start_.x.bg;
+  for (const int part : {at::g, at::ba, at::bg}) make_independent(e.P, part, start_.P.block<3, 3>(part, part));
+}
+
+// Along a corridor parts seem to know what they do not: nothing is known then of the velocity, nor of how far it has taken the robot.
+void MovingStart::doubt_velocity(Estimate& e) {
+  const Eigen::Matrix3d of_velocity = start_.P.block<3, 3>(at::v, at::v);
+  make_independent(e.P, at::v, of_velocity);
+  const double since = to_seconds(e.t - start_.t);
+  PoseCovariance way = PoseCovariance::Zero();
+  way.bottomRightCorner<3, 3>() = since * since * of_velocity;
+  map_.begin_at(e.x.pose(), way);
+}
+
 bool MovingStart::register_part(const LidarScan& part, History& history, PointDrops& drops) {
   const Time begin = begin_of(part), end = end_of(part);
   if (begin < history.base().t) return false;
@@ -79,15 +96,24 @@ bool MovingStart::add(const LidarScan& scan, History& history, PointDrops& drops
     begin_map(e);
     make_independent(e.P, at::v, 4 * of_velocity);  // parts are registered to those before: they err alike
   }
+  if (is_over_ && !is_known) doubt_velocity(e);
   if (begins_anew || !is_roughly_known_) {
-    e.x.g = start_.x.g;
-    e.x.ba = start_.x.ba;
-    e.x.bg = start_.x.bg;
-    for (const int part : {at::g, at::ba, at::bg}) make_independent(e.P, part, start_.P.block<3, 3>(part, part));
+    guess_again(e);
     history.rebase(e);
   }
   history.advance_to(end_of(scan));
   return any;
+}
+
+void MovingStart::give_up(History& history, Time now) {
+  is_over_ = true;
+  if (!first_sweep_) return;
+  Estimate e = history.base();
+  begin_map(e);
+  doubt_velocity(e);
+  guess_again(e);
+  history.rebase(e);
+  history.advance_to(now);
 }
 
 }  // namespace kilvo

@@ -22,6 +22,8 @@ class MovingStart {
   /// The parts of the next sweep correct the history, which has come to the sweep's end then. True when any of them was registered.
   /// `drops`: counts the points that are not used.
   bool add(const LidarScan& scan, History& history, PointDrops& drops);
+  /// Something else tells the velocity from now on.
+  void give_up(History& history, Time now);
   /// The velocity is known, or has not been found for long: gravity and biases are the guesses of the start again, of which parts of sweeps
   /// say too little.
   bool is_over() const { return is_over_; }
@@ -30,6 +32,8 @@ class MovingStart {
 
  private:
   void begin_map(Estimate& e);
+  void guess_again(Estimate& e) const;
+  void doubt_velocity(Estimate& e);
   bool register_part(const LidarScan& part, History& history, PointDrops& drops);
 
   LidarMount mount_;

@@ -32,6 +32,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
     keep_plausible(true);
     return findings_.drop(Sensor::lidar, Reason::before_motion);
   }
+  if (moving_start_ && !moving_start_->is_over()) moving_start_->give_up(history_, history_.now().t);
   Stopwatch watch;
   // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
   // the sweep cancels to first order. What came since is propagated again.
