@@ -106,8 +106,8 @@ bool MovingStart::add(const LidarScan& scan, History& history, PointDrops& drops
 }
 
 void MovingStart::give_up(History& history, Time now) {
-  is_over_ = true;
   if (!first_sweep_) return;
+  is_over_ = true;
   Estimate e = history.base();
   begin_map(e);
   doubt_velocity(e);

@@ -22,7 +22,7 @@ class MovingStart {
   /// The parts of the next sweep correct the history, which has come to the sweep's end then. True when any of them was registered.
   /// `drops`: counts the points that are not used.
   bool add(const LidarScan& scan, History& history, PointDrops& drops);
-  /// Something else tells the velocity from now on.
+  /// Something else tells the velocity from now on: what sweeps have told is not kept.
   void give_up(History& history, Time now);
   /// The velocity is known, or has not been found for long: gravity and biases are the guesses of the start again, of which parts of sweeps
   /// say too little.
