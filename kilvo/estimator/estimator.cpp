@@ -97,7 +97,7 @@ void Estimator::begin(const Start& start, std::vector<Output>& out) {
   constexpr Duration a_step = std::chrono::seconds(1);
   if (vision_) vision_->begin_at(start.still ? t : t + longest_moving_start);
   lidar_.begin_at(start.still || !input_.uses(Sensor::legs) ? t : t + a_step, start.estimate.x.pose());
-  if (!start.still && !map_.is_given()) moving_start_.emplace(input_.robot().lidar, config_, start.estimate);
+  if (!start.still && input_.uses(Sensor::lidar) && !map_.is_given()) moving_start_.emplace(input_.robot().lidar, config_, start.estimate);
   if (!start.still) findings_.report(situation(), {}, Reason::moving_start);
   const double norm = start.resting_norm * start.accel_scale;
   if (std::abs(norm - standard_gravity) > 0.1 * standard_gravity)

@@ -94,6 +94,7 @@ SensorStatus::Change SensorStatus::choose(Time t, const Health& health) {
   std::optional<Sensor> changed;  // the first of these
   for (const Sensor s : {Sensor::lidar, Sensor::legs, Sensor::camera}) {
     const auto used = last_used(s);
+    // Of the legs lose_legs() decides.
     const bool is_there = used && (s == Sensor::legs || !is_silence(t - *used, rate_of(s)));
     const bool counts = is_there && (s != Sensor::camera || track(Sensor::lidar).counts);
     if (counts != std::exchange(track(s).counts, counts) && !changed) changed = s;

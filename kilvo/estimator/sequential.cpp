@@ -27,12 +27,14 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   if (history_.replay().is_blind(begin, end)) return findings_.drop(Sensor::lidar, Reason::no_imu);
   if (!status_.may_frame_return(Sensor::lidar, end, imu_.is_calm(end))) return findings_.drop(Sensor::lidar, Reason::not_calm);
   if (frames_.last_middle()) lidar_.note_silence(begin - *status_.last_used(Sensor::lidar));
-  if (moving_start_ && !moving_start_->is_over() && !status_.has_legs()) {
-    if (moving_start_->add(scan, history_, findings_.statistics().points)) status_.use(Sensor::lidar, end);
-    keep_plausible(true);
-    return findings_.drop(Sensor::lidar, Reason::before_motion);
+  if (moving_start_ && !moving_start_->is_over()) {
+    if (!status_.has_legs()) {
+      if (moving_start_->add(scan, history_, findings_.statistics().points)) status_.use(Sensor::lidar, end);
+      keep_plausible(true);
+      return findings_.drop(Sensor::lidar, Reason::before_motion);
+    }
+    moving_start_->give_up(history_, history_.now().t);
   }
-  if (moving_start_ && !moving_start_->is_over()) moving_start_->give_up(history_, history_.now().t);
   Stopwatch watch;
   // The state is updated at the middle of the sweep: half of the points are older, half are younger, so what the IMU gets wrong within
   // the sweep cancels to first order. What came since is propagated again.
