@@ -10,6 +10,7 @@
 #include "kilvo/lidar/undistort.hpp"
 #include "lab/simulation/analytic_room.hpp"
 #include "tests/helpers/exact_map.hpp"
+#include "tests/helpers/predict.hpp"
 
 namespace kilvo {
 namespace consistency_test {
@@ -74,7 +75,7 @@ class GivenMapOdometry {
   Estimate propagate(Estimate e, Time until) {
     for (std::size_t i = 1; i < imu_.size() && e.t < until; ++i) {
       if (imu_[i].t <= e.t) continue;
-      e = predict(e, ImuInterval::between(imu_[i - 1], imu_[i], e.t, std::min(until, imu_[i].t)), {}, noise_);
+      e = test::predict(e, ImuInterval::between(imu_[i - 1], imu_[i], e.t, std::min(until, imu_[i].t)), {}, noise_);
       trajectory_.push(e.t, e.x.pose(), e.x.v);
     }
     return e;

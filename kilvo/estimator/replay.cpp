@@ -242,12 +242,10 @@ void Replay::copy_since(Time t, const Replay& other) {
   imu_.clear();
   clear_steps();
   // What forget_before would leave.
-  for (std::size_t i = 0; i < other.imu_.size(); ++i) {
+  for (std::size_t i = 0; i < other.imu_.size(); ++i)
     if (i + 2 >= other.imu_.size() || other.imu_[i + 1].t > t) imu_.push_back(other.imu_[i]);
-  }
-  for (std::size_t i = 0; i < other.steps_.size(); ++i) {
+  for (std::size_t i = 0; i < other.steps_.size(); ++i)
     if (i + 1 >= other.steps_.size() || other.steps_[i + 1].t > t) steps_.push_back(other.steps_[i]);
-  }
   sweep_noise_ = other.sweep_noise_;
   rest_until_ = other.rest_until_;
   usual_ = other.usual_;

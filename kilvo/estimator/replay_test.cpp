@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/helpers/predict.hpp"
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
@@ -107,10 +108,10 @@ TEST(Replay, BetweenTwoSamplesBothAreUsedAndAfterTheNewestItIsHeld) {
   const ImuSample a = imu_at({}), b = imu_at(milliseconds(5));
   const Time middle = begin_time + milliseconds(2), later = b.t + milliseconds(3);
   const ProcessNoise noise = EstimatorConfig{}.noise;
-  Estimate expected = predict(start(), ImuInterval::between(a, b, a.t, middle), {}, noise);
+  Estimate expected = test::predict(start(), ImuInterval::between(a, b, a.t, middle), {}, noise);
   expect_same(advanced(replay, start(), middle), expected);
-  expected = predict(expected, ImuInterval::between(a, b, middle, b.t), {}, noise);
-  expected = predict(expected, ImuInterval::hold(b, b.t, later), {}, noise);
+  expected = test::predict(expected, ImuInterval::between(a, b, middle, b.t), {}, noise);
+  expected = test::predict(expected, ImuInterval::hold(b, b.t, later), {}, noise);
   expect_same(advanced(replay, advanced(replay, start(), middle), later), expected);
 }
 
@@ -135,7 +136,8 @@ TEST(Replay, AnIntervalThatIsClosedLaterIsAsIfBothEndsHadBeenKnown) {
   const Estimate held = advanced(replay, start(), next);
   replay.add(imu_at(milliseconds(5)));
   const Estimate closed = advanced(replay, start(), next);
-  expect_same(closed, predict(start(), ImuInterval::between(imu_at({}), imu_at(milliseconds(5)), begin_time, next), {}, config.noise));
+  expect_same(closed,
+              test::predict(start(), ImuInterval::between(imu_at({}), imu_at(milliseconds(5)), begin_time, next), {}, config.noise));
   EXPECT_GT(boxminus(held.x, closed.x).norm(), 1e-6);
 }
 

@@ -5,6 +5,7 @@
 
 #include "kilvo/filter/predict.hpp"
 #include "kilvo/filter/update.hpp"
+#include "tests/helpers/predict.hpp"
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
@@ -59,7 +60,7 @@ TEST(LongRun, TheCovarianceStaysSymmetricPositiveDefiniteOverAMillionMixedSteps)
       const Time end = e.t + Duration(i % 7 == 0 ? 1'000'000 : 5'000'000);
       const ImuSample s{e.t, random.vector3(0.5), Eigen::Vector3d(0, 0, standard_gravity) + random.vector3(1)};
       const FootOrientations feet = {i % 200 < 100 ? std::optional<SO3>(SO3()) : std::nullopt, std::nullopt};
-      e = predict(e, ImuInterval::hold(s, e.t, end), feet, {});
+      e = test::predict(e, ImuInterval::hold(s, e.t, end), feet, {});
     }
     if (i % 1000 == 999 || i % 1000 == 998) {
       ASSERT_EQ(e.P, e.P.transpose()) << i;

@@ -59,10 +59,6 @@ using FootOrientations = std::array<std::optional<SO3>, 2>;
 
 /// Moves the estimate from interval.begin to interval.end. `e.t` must be interval.begin and the interval not negative.
 void carry(Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise);
-inline Estimate predict(Estimate e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise) {
-  carry(e, interval, feet, noise);
-  return e;
-}
 
 /// The mean alone.
 State predict_mean(const State& x, const ImuInterval& interval);

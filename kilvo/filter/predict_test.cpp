@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/helpers/predict.hpp"
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
@@ -92,7 +93,7 @@ TEST(Predict, MeanAndEstimateAgreeAndNothingElseMoves) {
   for (int i = 0; i < 20; ++i) {
     const Estimate e{begin_time, test::random_state(random), random.covariance<at::size>(0.1)};
     const ImuInterval interval = random_interval(random, 0.005);
-    const Estimate after = predict(e, interval, {}, {});
+    const Estimate after = test::predict(e, interval, {}, {});
     EXPECT_EQ(after.t, interval.end);
     const State mean = predict_mean(e.x, interval);
     EXPECT_EQ(after.x.R.matrix(), mean.R.matrix());
@@ -112,7 +113,7 @@ Covariance transition_of(const State& x, const ImuInterval& interval) {
   for (int i = 0; i < at::tau; ++i) {
     Estimate e{begin_time, x, Covariance::Zero()};
     e.P(i, at::tau) = e.P(at::tau, i) = 1;
-    F.col(i) = predict(e, interval, {}, no_noise()).P.col(at::tau);
+    F.col(i) = test::predict(e, interval, {}, no_noise()).P.col(at::tau);
   }
   return F;
 }
@@ -154,7 +155,7 @@ TEST(Predict, TheCovarianceIsTransportedByTheTransition) {
     const ImuInterval interval = random_interval(random, 0.05);
     const Covariance F = transition_of(e.x, interval);
     const Covariance expected = F * e.P * F.transpose();
-    const Covariance found = predict(e, interval, {}, no_noise()).P;
+    const Covariance found = test::predict(e, interval, {}, no_noise()).P;
     EXPECT_LT((found - expected).norm(), 1e-13 * expected.norm());
     EXPECT_EQ(found, found.transpose());
   }
@@ -167,7 +168,7 @@ Estimate one_second(double rate, double scale = 1) {
   for (int i = 0; i < static_cast<int>(rate); ++i) {
     ImuInterval interval = ImuInterval::hold({e.t, {0.3, -0.2, 0.5}, {0.5, 1, 9.5}}, e.t, begin_time + from_seconds((i + 1) / rate));
     interval.gyro_scale = interval.accel_scale = scale;
-    e = predict(e, interval, standing, {});
+    e = test::predict(e, interval, standing, {});
   }
   return e;
 }
@@ -204,7 +205,7 @@ TEST(Predict, AFootThatDoesNotStandGetsNoNoise) {
   Estimate e;
   e.t = begin_time;
   const ImuInterval interval = ImuInterval::hold({e.t, {0, 0, 0}, {0, 0, 9.8}}, e.t, e.t + from_seconds(0.1));
-  const Covariance P = predict(e, interval, {std::nullopt, SO3()}, {}).P;
+  const Covariance P = test::predict(e, interval, {std::nullopt, SO3()}, {}).P;
   EXPECT_EQ(P(at::pcl, at::pcl), 0);
   EXPECT_NEAR(P(at::pcr, at::pcr), ProcessNoise{}.foot * ProcessNoise{}.foot * 0.1, 1e-12);
 }
@@ -224,7 +225,7 @@ TEST(ImuInterval, BetweenTwoSamplesIsThePieceOfTheStraightLine) {
 TEST(Predict, AnEmptyIntervalChangesNothing) {
   test::Random random(7);
   const Estimate e{begin_time, test::random_state(random), random.covariance<at::size>(0.1)};
-  const Estimate after = predict(e, random_interval(random, 0), {}, {});
+  const Estimate after = test::predict(e, random_interval(random, 0), {}, {});
   EXPECT_LT(boxminus(after.x, e.x).norm(), 1e-14);
   EXPECT_LT((after.P - e.P).norm(), 1e-15);
 }

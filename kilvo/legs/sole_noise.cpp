@@ -38,6 +38,7 @@ void SoleNoise::add(std::size_t side, const Eigen::Vector3d& velocity_W, const E
   } else {
     restart();
     upwards_.add(up * up, 1);
+    knows_vertical_ = true;
   }
 }
 
@@ -59,6 +60,9 @@ void SoleNoise::add_rise(std::size_t side, double up, double variance_v) {
 }
 
 double SoleNoise::horizontal() const { return std::max(config_.velocity_sigma, common * std::sqrt(across_.mean())); }
-double SoleNoise::vertical() const { return std::max(config_.vertical_velocity_sigma, std::sqrt(upwards_.mean())); }
+double SoleNoise::vertical() const {
+  const double learnt = std::sqrt(upwards_.mean());
+  return knows_vertical_ ? std::max(config_.velocity_sigma, common * learnt) : std::max(config_.vertical_velocity_sigma, learnt);
+}
 
 }  // namespace kilvo

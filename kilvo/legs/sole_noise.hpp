@@ -13,7 +13,8 @@
 namespace kilvo {
 
 /// Velocity of a contact point, averaged over the correlation time of its noise: a sole that rolls, slides, gives way or is measured badly
-/// does so for all of that time. Never less than the settings say.
+/// does so for all of that time. Never less than the settings say: of the vertical, once a LiDAR has shown how the soles settle, than they
+/// say of the horizontal.
 ///
 /// While nothing but the legs measures the vertical velocity, noise and error of the state are told apart as Mehra (1970) does: the noise
 /// of a stance is its own, so that what successive stances of opposite feet have in common is an error of the state.
@@ -49,6 +50,7 @@ class SoleNoise {
   RunningStatistics alike_;                         // products of successive averages of opposite feet, (m/s)^2
   std::array<std::optional<double>, 2> last_rise_;  // m/s, the last average of each foot
   std::optional<double> rise_;
+  bool knows_vertical_ = false;  // something else than the legs has measured it
 };
 
 }  // namespace kilvo

@@ -23,8 +23,6 @@ constexpr double surely_turning = 0.1;
 constexpr double sink_share = 0.15;
 // A foot enters loosely and settles over this time, s.
 constexpr double entry_time = 0.02;
-// Of two feet that stand, the lighter one counts less: a sole that carries little slides and rolls. So much is left to it at least.
-constexpr double least_load = 0.01;
 constexpr double shortest_step = 1e-4;  // s
 // What descriptions and sinking soles make of the way as height: both feet show it, and it is no error of the state.
 constexpr double described_share = 0.015;
@@ -63,7 +61,7 @@ StanceTracker::StanceTracker(const LegConfig& config)
     : config_(config),
       step_height_(0, 0.01, 1, 5),
       noise_(config),
-      adapts_(config.adaptation != "none"),
+      by_foot_(config.adaptation == "foot"),
       by_row_(config.adaptation == "row"),
       has_heights_(config.height != "never"),
       by_contacts_(config.ground == "contacts") {}
@@ -197,22 +195,24 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     if (foot.begins && has_heights_) add_ground(side, foot, x, support.map, contacts.normal, support.ground);
     // Eq. 8: what moves is believed less; so is what has just arrived.
     const Eigen::Vector3d velocity = velocity_W(x, foot.point.p, foot.point.v, omega);
-    const double moving2 = velocity.squaredNorm();
+    if (foot.begins) sole_velocity_[side] = velocity;
+    sole_velocity_[side] += std::min(1.0, 2 * out.dt / entry_time) * (velocity - sole_velocity_[side]);
+    const double moving2 = sole_velocity_[side].squaredNorm();
     if (phase > config_.entry_delay + entry_time)
       noise_.add(side, velocity, -x.g.normalized(), out.dt,
                  support.on_legs_alone ? std::optional(std::hypot(sigma_v, described_share * x.v.norm())) : std::nullopt);
     const double noise2 = out.velocity_sigma * out.velocity_sigma + sigma_v * sigma_v;
     const double entering = std::clamp(1.0 - (phase - config_.entry_delay) / entry_time, 0.0, 1.0);
     // What still slides as it comes down takes its contact position along. Later only an error of the state would seem to slide for long.
-    if (entering > 0) foot.slide_variance = moving2 * entry_time * out.dt;
+    if (entering > 0) foot.slide_variance = velocity.squaredNorm() * entry_time * out.dt;
     // As much as the noise across on all three axes is no motion.
-    const bool by_foot = adapts_ && !by_row_;
-    const double loose = 1.0 + (by_foot ? std::max(0.0, moving2 / noise2 - 3.0) : 0.0) + (loosest - 1) * entering;
+    const double loose = 1.0 + (by_foot_ ? std::max(0.0, moving2 / noise2 - 3.0) : 0.0) + (loosest - 1) * entering;
     if (by_row_ && !foot.begins)
       foot.row_scale = scale_of_rows(velocity, noise2, foot_position(x, foot.point, x.pc[side] + x.R * foot.shift).r,
                                      room_to_settle * config_.position_sigma * config_.position_sigma);
-    const double lighter = carries[1 - side] ? std::max(1.0, contacts.load[1 - side] / std::max(least_load, contacts.load[side])) : 1.0;
-    foot.variance_scale = std::min(lighter * loose / std::max(0.01, contacts.probability[side]), loosest * loosest);
+    // Of two feet that stand, the lighter one counts less: a sole that carries little slides and rolls.
+    const double lighter = carries[1 - side] ? std::max(1.0, contacts.load[1 - side] / contacts.load[side]) : 1.0;
+    foot.variance_scale = std::min(lighter * loose / contacts.probability[side], loosest * loosest);
   }
   out.rise = noise_.take_rise();
   return out;

@@ -37,7 +37,6 @@ class StanceTracker {
   /// Which feet's rows were within their gates of the last step. A foot that is beyond for a while has slipped: it enters anew, where it
   /// then is.
   void judge(const LegStep& step, const std::array<bool, 2>& passed);
-  bool standing(std::size_t side) const { return weights_[side].has_value(); }
 
  private:
   using Weights = std::array<double, max_corners>;
@@ -53,13 +52,14 @@ class StanceTracker {
   std::array<std::optional<Weights>, 2> weights_;  // of each standing foot
   double sink_ = 0, sink_variance_ = 0;            // of the feet over the map's planes, as learned, m
   std::array<bool, 2> leave_ = {false, false};
-  RunningStatistics step_height_;               // of a foot that comes down, over the plane through the other, m
-  std::array<std::optional<Time>, 2> refused_;  // since when
+  RunningStatistics step_height_;                 // of a foot that comes down, over the plane through the other, m
+  std::array<std::optional<Time>, 2> refused_;    // since when
+  std::array<Eigen::Vector3d, 2> sole_velocity_;  // of each standing foot, averaged, in the world, m/s
   std::array<FootPose, 2> last_pose_;
   std::array<Time, 2> changed_{};  // when the encoders of the foot last said something new
   SoleNoise noise_;
-  bool adapts_, by_row_, has_heights_, by_contacts_;  // of the settings
-  GroundLookup places_;                               // of the touchdowns
+  bool by_foot_, by_row_, has_heights_, by_contacts_;  // of the settings
+  GroundLookup places_;                                // of the touchdowns
   StandingRate standing_rate_;
 };
 

@@ -4,7 +4,7 @@ import unittest
 
 from planted_tree import PlantedTree
 
-LIMIT = 494
+LIMIT = 493
 
 
 class CheckConstants(PlantedTree):
