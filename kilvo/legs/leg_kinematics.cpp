@@ -28,7 +28,7 @@ struct LegKinematics::Chains {
   std::vector<double> last_position, velocity;
   Time last_t{};
 
-  std::optional<std::string> look_up_planes(const std::vector<std::string>& names);
+  std::optional<std::string> look_up_joints(const std::vector<std::string>& names);
   const std::vector<double>* velocity_of(const JointSample& s);  // nullptr: not known
   FootPose pose_of(std::size_t side, const JointSample& s, const std::vector<double>& velocity);
   std::optional<Eigen::Vector3d> force_on(std::size_t side, const JointSample& s);
@@ -36,7 +36,7 @@ struct LegKinematics::Chains {
 };
 
 // Where in a message of these names each joint is.
-std::optional<std::string> LegKinematics::Chains::look_up_planes(const std::vector<std::string>& names) {
+std::optional<std::string> LegKinematics::Chains::look_up_joints(const std::vector<std::string>& names) {
   if (names == message_names) return std::nullopt;
   for (JointChain& leg : legs) {
     if (const auto missing = leg.look_up(names)) {
@@ -144,7 +144,7 @@ std::variant<Feet, std::string> LegKinematics::feet(const JointSample& s) {
   Chains& c = *chains_;
   if (c.by_joints) {
     if (s.names.size() != s.position.size()) return "as many names as positions are needed";
-    if (auto missing = c.look_up_planes(s.names)) return std::move(*missing);
+    if (auto missing = c.look_up_joints(s.names)) return std::move(*missing);
   } else if (s.position.size() != 6) {
     return "two feet need six positions";
   }

@@ -1,5 +1,6 @@
 #include "lab/doctor/diagnosis_text.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
@@ -24,7 +25,9 @@ std::string to_text(const Diagnosis& diagnosis) {
   }
   const std::size_t n = diagnosis.findings.size();
   if (n > 0) return out + fmt::format("The description is wrong in {} place{}.\n", n, n == 1 ? "" : "s");
-  return out + (diagnosis.unknown() ? "Nothing could be judged.\n" : "The description fits the data.\n");
+  if (diagnosis.unknown()) return out + "Nothing could be judged.\n";
+  const bool in_part = std::ranges::any_of(diagnosis.checks, [](const Check& c) { return c.verdict == Check::Verdict::unknown; });
+  return out + (in_part ? "What could be judged of the description fits the data.\n" : "The description fits the data.\n");
 }
 
 std::string to_json(const Diagnosis& diagnosis) {

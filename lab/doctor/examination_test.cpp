@@ -9,6 +9,7 @@
 #include "lab/settings/settings.hpp"
 #include "lab/simulation/description.hpp"
 #include "lab/simulation/simulator.hpp"
+#include "tests/helpers/random.hpp"
 
 namespace kilvo::lab {
 namespace examination_test {
@@ -166,6 +167,19 @@ TEST(Doctor, AJointOfAnotherZeroIsNamed) {
   ASSERT_LT(hip, recorded.joint_names.size());
   for (LegSample& s : recorded.legs) s.position[hip] += 1.5707963;
   EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("joint_offset"));
+}
+
+// Their turning is not that of the gyro under any description, but the feet of a robot that walks are below it.
+TEST(Doctor, AnImuUpsideDownIsNamedThoughRoughEncodersTellNoTurning) {
+  Recorded recorded = walked().recorded;
+  test::Random random(3);
+  for (LegSample& s : recorded.legs) {
+    for (double& q : s.position) q += random.normal(0.05);
+  }
+  EXPECT_THAT(causes(recorded, walked().robot), IsEmpty());
+  Robot robot = walked().robot;
+  robot.imu.T_link_imu.R = turned({180, 0, 0}) * robot.imu.T_link_imu.R;
+  EXPECT_THAT(causes(recorded, robot), ElementsAre("imu_mount_rotation"));
 }
 
 std::vector<WrongDescription> watched(const Robot& robot, bool leg_clock_is_found, DescriptionWatch::Judging judging,

@@ -34,9 +34,10 @@ std::optional<double> Examination::tilt_under(const SO3& R_link_imu, bool only_c
   return least;
 }
 
-// Without a LiDAR the accelerometer has only the robot's uprightness to be held against.
+// Without a LiDAR the accelerometer, and without legs that turn as the gyro does the IMU's mount, has only the robot's uprightness to be
+// held against.
 void Examination::examine_upright() {
-  if (recorded_.legs.empty() || robot_.legs.type != "joints" || lidar_.known) return;
+  if (recorded_.legs.empty() || robot_.legs.type != "joints" || (lidar_.known && legs_.known)) return;
   const std::optional<double> tilt = tilt_under(robot_.imu.T_link_imu.R, true);
   if (!tilt) return;
   const double angle = *tilt;
