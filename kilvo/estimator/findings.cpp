@@ -195,12 +195,12 @@ void Findings::judge_biases(const Situation& now) {
   const auto sigma = [&now](int part) { return std::sqrt(std::max(0.0, now.estimate.P.diagonal().segment<3>(part).maxCoeff())); };
   const Biases present = {now.estimate.x.ba, now.estimate.x.bg};
   if (!first_biases_) first_biases_ = present;
-  // Those of a start on the move are a guess: they may change, but not by anything.
+  // Those of a start on the move are a guess: they may be anything until they are known.
   if (!known_biases_ && 5 * sigma(at::ba) < strange_accel && 5 * sigma(at::bg) < strange_gyro) known_biases_ = present;
   const auto beyond = [&present](const Biases& before, double accel, double gyro) {
     return (present.accel - before.accel).norm() > accel || (present.gyro - before.gyro).norm() > gyro;
   };
-  const bool impossible = beyond(*first_biases_, impossible_accel, impossible_gyro);
+  const bool impossible = known_biases_ && beyond(*first_biases_, impossible_accel, impossible_gyro);
   const bool strange = known_biases_ && beyond(*known_biases_, strange_accel, strange_gyro);
   if (impossible ? statistics_.diverged : (strange_biases_ || !strange)) return;
   strange_biases_ = true;

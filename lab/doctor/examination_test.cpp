@@ -79,6 +79,22 @@ TEST(Doctor, ALidarThatIsTurnedIsNamedWithItsMount) {
   }
 }
 
+// A mount that hardly turns may be off by what its inverse is; its place says that it is not inverted.
+TEST(Doctor, AMountThatIsOffByItsInverseIsTurnedAndNotInverted) {
+  const SO3 Q = turned({0.6, 0, 0});
+  Recorded recorded = walked().recorded;
+  for (Sweep& sweep : recorded.sweeps) {
+    for (auto& p : sweep.points) p.p = (Q.matrix() * p.p.cast<double>()).cast<float>();
+  }
+  Robot robot = walked().robot;
+  ASSERT_TRUE(robot.lidar.T_imu_lidar.R.matrix().isIdentity(1e-9)) << "so that Q is right";
+  robot.lidar.T_imu_lidar.R = Q;
+  const Diagnosis diagnosis = Examination(recorded, robot).run();
+  ASSERT_EQ(diagnosis.findings.size(), 1u);
+  EXPECT_EQ(diagnosis.findings[0].cause, "lidar_rotation");
+  EXPECT_EQ(diagnosis.findings[0].changes.size(), 1u) << "of the rotation alone";
+}
+
 TEST(Doctor, ClocksAreNamed) {
   for (const double offset : {0.01, -0.1, 0.7}) {
     Recorded recorded = walked().recorded;

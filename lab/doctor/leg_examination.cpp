@@ -3,7 +3,9 @@
 #include <array>
 #include <cmath>
 #include <fmt/core.h>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "kilvo/math/decompositions.hpp"
 #include "lab/doctor/examination.hpp"
@@ -14,6 +16,8 @@ namespace {
 
 constexpr double least_explained = 0.5;
 constexpr std::size_t calm_poses = 6;     // of which one is looked at: neighbours say the same
+constexpr std::size_t least_still = 12;   // poses: longer than both feet of a walking robot stand
+constexpr double least_step = 0.005;      // m, from one pose to the next: of a foot that does not stand
 constexpr double much_better_legs = 0.6;  // of the cost that a hypothesis may leave
 
 // Normal of a sole, towards the link that stands on it.
@@ -70,11 +74,16 @@ Examination::LegScore Examination::score_legs(const std::vector<LegPose>& path, 
   }
   std::vector<double> angles;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  std::size_t k = 0, n = 0;
+  std::size_t still = 0, n = 0;  // poses: since it stands still, and looked at
+  std::optional<Eigen::Vector3d> before;
   for (const LegPose& pose : path) {
     const double t = pose.t + offset;
-    if (!gyro_path.covers(t - 0.1, t + 0.1) || gyro_path.rate(t - 0.1, t + 0.1).norm() > 0.05) continue;
-    if (k++ % calm_poses != 0) continue;
+    const Eigen::Vector3d apart = pose.foot[1].p[0] - pose.foot[0].p[0], last = std::exchange(before, apart).value_or(apart);
+    // A foot in the air is not flat, nor one that rolls from step to step.
+    const bool calm =
+        (apart - last).norm() < least_step && gyro_path.covers(t - 0.1, t + 0.1) && gyro_path.rate(t - 0.1, t + 0.1).norm() < 0.05;
+    still = calm ? still + 1 : 0;
+    if (still < least_still || still % calm_poses != 0) continue;
     const Eigen::Vector3d left = normal_of(pose.foot[0]), right = normal_of(pose.foot[1]);
     if (left.isZero() || right.isZero()) continue;
     angles.push_back(angle_between(left, right));

@@ -63,6 +63,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   constexpr double well = 0.45, as_feet_do = 0.35;  // of the time in which the robot moves
   std::vector<LegHypothesis> all;
   if (described.worth() < well * described.moving) all = leg_hypotheses(recorded_legs_, robot_);
+  const std::size_t plain = all.size();
   if (described.worth() < least_standing) {
     for (LegHypothesis& h : gross_leg_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
     for (LegHypothesis& h : size_hypotheses()) all.push_back(std::move(h));
@@ -74,7 +75,8 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   const LegHypothesis* best = nullptr;
   Standing then;
   for (const LegHypothesis& h : all) {
-    if (static_cast<std::size_t>(&h - all.data()) == joints) {
+    const auto k = static_cast<std::size_t>(&h - all.data());
+    if (k == joints) {
       if (best != nullptr) break;
       longer = std::max(2 * described.both() + least_standing, as_feet_do * described.moving);
     }
@@ -82,6 +84,8 @@ bool Examination::try_standing_hypotheses(double longer_than) {
     if (h.culprit != Sensor::legs && (legs_.known || turns_with_link(h))) continue;
     const Standing s = stands(&h);
     if (s.worth() <= most || s.both() <= longer) continue;
+    // Among many that are far off one stands a little by chance.
+    if (k >= plain && k < joints && s.worth() < as_feet_do * s.moving) continue;
     most = s.worth();
     then = s;
     best = &h;

@@ -55,6 +55,12 @@ void Examination::examine_lidar() {
   examine_lidar_position();
 }
 
+// Which of two places of the LiDAR its way tells of: a mount that hardly turns may be off by what its inverse is.
+bool Examination::is_nearer(const Eigen::Vector3d& p, const Eigen::Vector3d& other, const SO3& R_IL) const {
+  const auto place = TranslationRows(way_, recorded_.imu, gyro(), R_IL, lidar_offset_).fit(accel_axes_);
+  return place && (place->r - p).norm() < (place->r - other).norm();
+}
+
 MountFit Examination::examine_lidar_rotation() {
   const std::vector<Turn> turns = way_.empty() ? lidar_turns_ : turns_of(way_);
   if (way_.empty()) way_ = first_;
@@ -112,9 +118,10 @@ MountFit Examination::examine_lidar_rotation() {
   f.turn = turn;
   const SE3 inverse = robot_.lidar.T_imu_lidar.inverse();
   // A mount that hardly turns is nearly its own inverse: the two must differ by what is wrong.
-  const bool inverted = degrees((inverse.R * described.inverse()).Log().norm()) > 0.7 * angle &&
-                        degrees((fit.R * inverse.R.inverse()).Log().norm()) < std::min(0.3 * angle, std::max(0.15 * angle, 3 * uncertain));
-  if (inverted) {
+  const bool turned_as_inverse =
+      degrees((inverse.R * described.inverse()).Log().norm()) > 0.7 * angle &&
+      degrees((fit.R * inverse.R.inverse()).Log().norm()) < std::min(0.3 * angle, std::max(0.15 * angle, 3 * uncertain));
+  if (turned_as_inverse && is_nearer(inverse.p, robot_.lidar.T_imu_lidar.p, fit.R)) {
     f.text = fmt::format("the LiDAR's mount is given the wrong way round (lidar from IMU): {} off", turn_text(SO3::Exp(turn)));
     f.cause = "lidar_inverted";
     robot_.lidar.T_imu_lidar.p = inverse.p;
