@@ -64,8 +64,10 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   std::vector<LegHypothesis> all;
   if (described.worth() < well * described.moving) all = leg_hypotheses(recorded_legs_, robot_);
   const std::size_t plain = all.size();
+  std::size_t gross = plain;
   if (described.worth() < least_standing) {
     for (LegHypothesis& h : gross_leg_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
+    gross = all.size();
     for (LegHypothesis& h : size_hypotheses()) all.push_back(std::move(h));
   }
   const std::size_t joints = all.size();
@@ -85,7 +87,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
     const Standing s = stands(&h);
     if (s.worth() <= most || s.both() <= longer) continue;
     // Among many that are far off one stands a little by chance.
-    if (k >= plain && k < joints && s.worth() < as_feet_do * s.moving) continue;
+    if (k >= plain && k < gross && s.worth() < as_feet_do * s.moving) continue;
     most = s.worth();
     then = s;
     best = &h;
