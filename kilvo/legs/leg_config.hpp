@@ -31,7 +31,7 @@ struct LegConfig {
               "acceleration), force (a threshold on what the joint efforts carry)"},
         Field{"velocity_sigma", &LegConfig::velocity_sigma, "m/s", "standard deviation of the velocity of a standing foot"},
         Field{"vertical_velocity_sigma", &LegConfig::vertical_velocity_sigma, "m/s",
-              "the same along the vertical, where soles settle and roll alike at every step"},
+              "the same along the vertical, where soles settle and roll alike at every step; until a LiDAR shows it"},
         Field{"velocity_correlation", &LegConfig::velocity_correlation, "s", "correlation time of that: rows closer together share it"},
         Field{"position_sigma", &LegConfig::position_sigma, "m", "standard deviation of the position of a standing foot"},
         Field{"position_correlation", &LegConfig::position_correlation, "s", "correlation time of that"},
