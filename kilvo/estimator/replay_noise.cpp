@@ -42,13 +42,14 @@ void Replay::note_usual(const ImuSample& s) {
 double Replay::longest_gap() const { return std::max(config_.max_imu_gap, periods_of_a_gap * usual_.period); }
 
 // What varies faster than the rate of the IMU is folded into it. As far as it is more than the settings say, a part of it stays in the
-// integral: the samples that follow do not take it all back.
+// integral, and as large a part of that each second in a bias: samples that are in step with the robot's steps add up.
 ProcessNoise Replay::noise_now() const {
   ProcessNoise noise = config_.noise;
-  if (usual_.period <= 0) return noise;
   constexpr double share = 0.4, gyro_share = 0.1;
   const double expected = noise.accel * noise.accel + 2 * noise.velocity * noise.velocity / (usual_.period * usual_.period);
-  noise.accel = std::sqrt(noise.accel * noise.accel + share * share * std::max(0.0, usual_.accel_density2 - expected));
+  const double stays = share * std::sqrt(std::max(0.0, usual_.accel_density2 - expected));
+  noise.accel = std::hypot(noise.accel, stays);
+  noise.accel_bias = std::hypot(noise.accel_bias, share * stays);
   noise.gyro = std::max(noise.gyro, gyro_share * std::sqrt(usual_.gyro_density2));
   return noise;
 }

@@ -145,8 +145,8 @@ std::vector<WrongDescription> DescriptionWatch::news() {
 std::vector<WrongDescription> DescriptionWatch::finish() {
   const std::lock_guard lock(mutex_);
   collect();
-  // A recording that ends before is judged by what there is.
-  if (!over_ && last_) {
+  // A recording that ends before is judged by what there is; a last window that is short tells less than those before it.
+  if (!over_ && last_ && (first_ || to_seconds(*last_ - *begin_) > dues.front())) {
     judge(*last_);
     collect();
   }

@@ -190,10 +190,10 @@ void Examination::accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matr
 
 void Examination::settle_axes() {
   if (!lidar_.known) {
-    // Feet that roll leave much unexplained in any axes, and a walk that hardly leans fits a mirrored gyro as well: other axes must explain
-    // what the described ones cannot.
+    // Feet that roll leave much unexplained in any axes, and a walk that hardly leans or turns fits a mirrored gyro as well: other axes must
+    // explain what the described ones cannot.
     constexpr double clearly = 0.5;  // of what is not explained
-    if (!legs_.known || 1 - legs_.explained > clearly * (1 - legs_.as_described)) return;
+    if (!legs_.known || !legs_turned() || 1 - legs_.explained > clearly * (1 - legs_.as_described)) return;
     const Eigen::Matrix3d G = nearest_permutation(legs_.error).transpose();
     if (G.determinant() < 0)
       accuse_imu_axes(G, Eigen::Matrix3d::Identity(), "the legs turn as the gyro does only with axes of the other hand");

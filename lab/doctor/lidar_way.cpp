@@ -11,7 +11,8 @@ namespace {
 
 // What an IMU that walks is off by over a tenth of a second, impacts that alias included (docs/decisions/imu-faults.md).
 constexpr double accel_density = 0.013, gyro_density = 4e-4;  // m/s^2 and rad/s per sqrt(Hz)
-constexpr double longest_step = 0.35;                         // s between sweeps
+constexpr double most_noise = 0.01;    // m, of a sweep's place: more is the accelerometer's, which tells nothing then
+constexpr double longest_step = 0.35;  // s between sweeps
 
 // The acceleration at a time between the sample before `it` and `it`.
 Eigen::Vector3d accel_at(double t, std::vector<InertialSample>::const_iterator it, const std::vector<InertialSample>& imu) {
@@ -144,7 +145,9 @@ void smooth_stations(std::vector<SweepStation>& run, const std::vector<InertialS
       apart.push_back(std::abs(after - before) * 0.5 * (dt[k - 1] + dt[k]));
     }
     // Of z[k - 1] - 2 z[k] + z[k + 1].
-    z = smooth(z, dt, dp, dv, std::max(1e-4, 1.48 * median(apart) / std::sqrt(6.0)), accel_density);
+    const double noise = 1.48 * median(apart) / std::sqrt(6.0);
+    if (noise > most_noise) continue;
+    z = smooth(z, dt, dp, dv, std::max(1e-4, noise), accel_density);
     for (std::size_t k = 0; k < n; ++k) run[k].T_WI.p[axis] = z[k];
   }
 }
