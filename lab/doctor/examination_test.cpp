@@ -4,12 +4,12 @@
 #include <functional>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <random>
 
 #include "lab/doctor/description_watch.hpp"
 #include "lab/settings/settings.hpp"
 #include "lab/simulation/description.hpp"
 #include "lab/simulation/simulator.hpp"
-#include "tests/helpers/random.hpp"
 
 namespace kilvo::lab {
 namespace examination_test {
@@ -188,9 +188,10 @@ TEST(Doctor, AJointOfAnotherZeroIsNamed) {
 // Their turning is not that of the gyro under any description, but the feet of a robot that walks are below it.
 TEST(Doctor, AnImuUpsideDownIsNamedThoughRoughEncodersTellNoTurning) {
   Recorded recorded = walked().recorded;
-  test::Random random(3);
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0, 0.05);  // rad
   for (LegSample& s : recorded.legs) {
-    for (double& q : s.position) q += random.normal(0.05);
+    for (double& q : s.position) q += noise(random);
   }
   EXPECT_THAT(causes(recorded, walked().robot), IsEmpty());
   Robot robot = walked().robot;
