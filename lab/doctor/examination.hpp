@@ -83,7 +83,7 @@ class Examination {
   void examine_lidar();
   /// Of rotation, clock and gyro bias at once.
   MountFit examine_lidar_rotation();
-  bool is_nearer(const Eigen::Vector3d& p, const Eigen::Vector3d& other, const SO3& R_IL) const;
+  bool lidar_is_nearer(const Eigen::Vector3d& p, const Eigen::Vector3d& other, const SO3& R_IL) const;
   void examine_lidar_clock(const MountFit& fit);
   void examine_lidar_position();
   // leg_examination.cpp

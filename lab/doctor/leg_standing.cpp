@@ -63,11 +63,11 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   constexpr double well = 0.45, as_feet_do = 0.35;  // of the time in which the robot moves
   std::vector<LegHypothesis> all;
   if (described.worth() < well * described.moving) all = leg_hypotheses(recorded_legs_, robot_);
-  const std::size_t plain = all.size();
-  std::size_t gross = plain;
+  const std::size_t first_gross = all.size();
+  std::size_t end_of_gross = first_gross;
   if (described.worth() < least_standing) {
     for (LegHypothesis& h : gross_leg_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
-    gross = all.size();
+    end_of_gross = all.size();
     for (LegHypothesis& h : size_hypotheses()) all.push_back(std::move(h));
   }
   const std::size_t joints = all.size();
@@ -87,7 +87,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
     const Standing s = stands(&h);
     if (s.worth() <= most || s.both() <= longer) continue;
     // Among many that are far off one stands a little by chance.
-    if (k >= plain && k < gross && s.worth() < as_feet_do * s.moving) continue;
+    if (k >= first_gross && k < end_of_gross && s.worth() < as_feet_do * s.moving) continue;
     most = s.worth();
     then = s;
     best = &h;

@@ -56,7 +56,7 @@ void Examination::examine_lidar() {
 }
 
 // Which of two places of the LiDAR its way tells of: a mount that hardly turns may be off by what its inverse is.
-bool Examination::is_nearer(const Eigen::Vector3d& p, const Eigen::Vector3d& other, const SO3& R_IL) const {
+bool Examination::lidar_is_nearer(const Eigen::Vector3d& p, const Eigen::Vector3d& other, const SO3& R_IL) const {
   const auto place = TranslationRows(way_, recorded_.imu, gyro(), R_IL, lidar_offset_).fit(accel_axes_);
   return place && (place->r - p).norm() < (place->r - other).norm();
 }
@@ -121,7 +121,7 @@ MountFit Examination::examine_lidar_rotation() {
   const bool turned_as_inverse =
       degrees((inverse.R * described.inverse()).Log().norm()) > 0.7 * angle &&
       degrees((fit.R * inverse.R.inverse()).Log().norm()) < std::min(0.3 * angle, std::max(0.15 * angle, 3 * uncertain));
-  if (turned_as_inverse && is_nearer(inverse.p, robot_.lidar.T_imu_lidar.p, fit.R)) {
+  if (turned_as_inverse && lidar_is_nearer(inverse.p, robot_.lidar.T_imu_lidar.p, fit.R)) {
     f.text = fmt::format("the LiDAR's mount is given the wrong way round (lidar from IMU): {} off", turn_text(SO3::Exp(turn)));
     f.cause = "lidar_inverted";
     robot_.lidar.T_imu_lidar.p = inverse.p;
