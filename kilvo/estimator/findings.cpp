@@ -193,16 +193,18 @@ void Findings::judge_speed(const Situation& now) {
 
 void Findings::judge_biases(const Situation& now) {
   const auto sigma = [&now](int part) { return std::sqrt(std::max(0.0, now.estimate.P.diagonal().segment<3>(part).maxCoeff())); };
+  const double accel_sigma = sigma(at::ba), gyro_sigma = sigma(at::bg);
   const Biases present = {now.estimate.x.ba, now.estimate.x.bg};
   if (!first_biases_) first_biases_ = present;
   // Those of a start on the move are a guess: they may be anything until they are known.
-  if (!known_biases_ && 5 * sigma(at::ba) < strange_accel && 5 * sigma(at::bg) < strange_gyro) known_biases_ = present;
-  const auto beyond = [&present](const Biases& before, double accel, double gyro) {
-    return (present.accel - before.accel).norm() > accel || (present.gyro - before.gyro).norm() > gyro;
+  if (!known_biases_ && 5 * accel_sigma < strange_accel && 5 * gyro_sigma < strange_gyro) known_biases_ = present;
+  if (!known_biases_) return;
+  // Aliased noise walks a bias: it may have gone as far as it is uncertain.
+  const auto beyond = [&](const Biases& before, double accel, double gyro) {
+    return (present.accel - before.accel).norm() > accel + 3 * accel_sigma || (present.gyro - before.gyro).norm() > gyro + 3 * gyro_sigma;
   };
-  const bool impossible = known_biases_ && beyond(*first_biases_, impossible_accel, impossible_gyro);
-  const bool strange = known_biases_ && beyond(*known_biases_, strange_accel, strange_gyro);
-  if (impossible ? statistics_.diverged : (strange_biases_ || !strange)) return;
+  const bool impossible = beyond(*first_biases_, impossible_accel, impossible_gyro);
+  if (impossible ? statistics_.diverged : strange_biases_ || !beyond(*known_biases_, strange_accel, strange_gyro)) return;
   strange_biases_ = true;
   const Biases& before = impossible ? *first_biases_ : *known_biases_;
   const double accel = (present.accel - before.accel).norm();

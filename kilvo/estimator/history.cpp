@@ -100,6 +100,8 @@ void History::rebase_to_closed() {
 
 void History::correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior) {
   replay_.correlate_with_sweep(end, shared_with_sweep<at::R>(prior, posterior), shared_with_sweep<at::p>(prior, posterior));
+  const double expected = (prior.P.diagonal() - posterior.P.diagonal()).segment<3>(at::v).sum();
+  if (expected > 0) replay_.learn_aliased_share((posterior.x.v - prior.x.v).squaredNorm() / expected);
 }
 
 void History::inflate_velocity(double sigma) {

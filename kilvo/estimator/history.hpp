@@ -76,7 +76,8 @@ class History {
   void rebase_to_closed();
   /// The pose at the time of `e` is that of `e`, its velocity has changed by `dv_W`: relative motion before stays what it was.
   void correct_trajectory(const Estimate& e, const Eigen::Vector3d& dv_W) { trajectory_.correct(e.t, e.x.pose(), dv_W); }
-  /// A sweep until `end` took `prior` to `posterior`, of its middle: see Replay::correlate_with_sweep.
+  /// A sweep until `end` took `prior` to `posterior`, of its middle: see Replay::correlate_with_sweep and
+  /// learn_aliased_share.
   void correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior);
   /// The velocity is less certain than the covariance says, by this standard deviation, m/s.
   void inflate_velocity(double sigma);

@@ -22,6 +22,17 @@ Statistics3 statistics_of(const std::deque<ImuSample>& window, Member member) {
 // The resting norm is near 1: the unit is g. Rescaling to the exact norm would hide the bias, so only the unit is changed.
 double unit_of(double resting_norm) { return std::abs(resting_norm - 1.0) < 0.1 ? standard_gravity : 1.0; }
 
+// How far the velocity leaves its mean's line, m/s: who comes to a stand within the window is slow to show in a deviation.
+double largest_change_of_velocity(const std::deque<ImuSample>& window, const Eigen::Vector3d& mean_accel) {
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();
+  double largest = 0;
+  for (std::size_t i = 1; i < window.size(); ++i) {
+    v += to_seconds(window[i].t - window[i - 1].t) * (0.5 * (window[i].accel + window[i - 1].accel) - mean_accel);
+    largest = std::max(largest, v.norm());
+  }
+  return largest;
+}
+
 // The mean specific force of a robot that moves, in the frame of the last sample: each is turned there by the gyro. Weighted by a bell over
 // the window, so that swaying and stepping, which return to where they began, leave nothing.
 Eigen::Vector3d mean_force(const std::deque<ImuSample>& window) {
@@ -88,7 +99,8 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   const bool gravity_stays = by_motion.norm() < 3 * noise || turned.dot(by_motion) < 0.5 * by_motion.squaredNorm();
   const bool is_bias = gyro.mean.norm() < usual_gyro_bias || (gyro.mean.norm() < largest_gyro_bias && gravity_stays);
   const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && is_bias && change.cwiseAbs().maxCoeff() < largest_change &&
-                     accel.sigma.maxCoeff() * unit < config_.still_accel;
+                     accel.sigma.maxCoeff() * unit < config_.still_accel &&
+                     largest_change_of_velocity(window_, accel.mean) * unit < 3 * config_.velocity_sigma;
   if (still) return start(true);
   if (s.t - *first_ >= from_seconds(config_.moving_start)) return start(false);
   return std::nullopt;

@@ -62,6 +62,9 @@ class Replay {
   /// of what the IMU will get wrong in rotation and in position until then.
   void correlate_with_sweep(Time end, double rotation, double position) { sweep_noise_ = {end, rotation, position}; }
 
+  /// A sweep changed the velocity by so much, squared, per variance of what it was to change it by.
+  void learn_aliased_share(double normalised);
+
   /// The robot stood still until `end`, if it did, and the first biases are the means of what the IMU said until then.
   void began_at_rest(std::optional<Time> end) { rest_until_ = end; }
 
@@ -90,6 +93,7 @@ class Replay {
 
  private:
   static constexpr std::size_t most_remembered = 100, most_taken = 12;
+  static constexpr double least_aliased_share = 0.4;
   // How a step was taken since the last close.
   struct Taken {
     Time t{};
@@ -126,6 +130,7 @@ class Replay {
     Eigen::Vector3d gyro_variance = Eigen::Vector3d::Zero(), accel_variance = Eigen::Vector3d::Zero();
     double gyro_density2 = 0, accel_density2 = 0;  // of the noise that second differences show, if it were white: (rad/s)^2 s, (m/s^2)^2 s
     double gyro_bend2 = 0, accel_bend2 = 0;        // how far a sample lay beside the line between its neighbours at the most, squared
+    double aliased_share = least_aliased_share;  // of the accelerometer's deviation that is more than expected, what stays in its integral
   };
   void note_usual(const ImuSample& s);
 

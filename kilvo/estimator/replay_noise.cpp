@@ -33,25 +33,33 @@ void Replay::note_usual(const ImuSample& s) {
   usual_.gyro_bend2 = std::max(gyro2, (1 - share) * usual_.gyro_bend2);
   usual_.accel_bend2 = std::max(accel2, (1 - share) * usual_.accel_bend2);
   // Half of a second difference: of white noise it has one and a half times the variance.
-  constexpr double white = 2.0 / 3.0, noise_memory = 0.5;
-  const double count = std::min(1.0, dt / noise_memory);
-  usual_.gyro_density2 += count * (white * gyro2 * dt - usual_.gyro_density2);
-  usual_.accel_density2 += count * (white * accel2 * dt - usual_.accel_density2);
+  const double count = std::min(1.0, 4 * dt / memory);
+  usual_.gyro_density2 += count * (2.0 / 3.0 * gyro2 * dt - usual_.gyro_density2);
+  usual_.accel_density2 += count * (2.0 / 3.0 * accel2 * dt - usual_.accel_density2);
 }
 
 double Replay::longest_gap() const { return std::max(config_.max_imu_gap, periods_of_a_gap * usual_.period); }
 
-// What varies faster than the rate of the IMU is folded into it. As far as it is more than the settings say, a part of it stays in the
-// integral, and as large a part of that each second in a bias: samples that are in step with the robot's steps add up.
+// What varies faster than the rate of the IMU is folded into it. As far as it is more than the settings say, a share of it stays in the
+// integral, and a part of that each second in a bias: samples that are in step with the robot's steps add up.
 ProcessNoise Replay::noise_now() const {
   ProcessNoise noise = config_.noise;
-  constexpr double share = 0.4, gyro_share = 0.1;
+  constexpr double gyro_share = 0.1;
   const double expected = noise.accel * noise.accel + 2 * noise.velocity * noise.velocity / (usual_.period * usual_.period);
-  const double stays = share * std::sqrt(std::max(0.0, usual_.accel_density2 - expected));
+  const double stays = usual_.aliased_share * std::sqrt(std::max(0.0, usual_.accel_density2 - expected));
   noise.accel = std::hypot(noise.accel, stays);
-  noise.accel_bias = std::hypot(noise.accel_bias, share * stays);
+  noise.accel_bias = std::hypot(noise.accel_bias, least_aliased_share * stays);
   noise.gyro = std::max(noise.gyro, gyro_share * std::sqrt(usual_.gyro_density2));
   return noise;
+}
+
+// R. K. Mehra, "On the identification of variances and adaptive Kalman filtering", 1970: innovations that are larger than the covariance
+// says tell how much of the noise stays. Impacts, which the next samples take back, are the least; vibration near a multiple of the rate
+// the most.
+void Replay::learn_aliased_share(double normalised) {
+  constexpr double sweeps = 5, most = 2;
+  const double next = usual_.aliased_share * std::sqrt(1 + (std::min(normalised, sweeps) - 1) / sweeps);
+  usual_.aliased_share = std::clamp(next, least_aliased_share, most);
 }
 
 }  // namespace kilvo

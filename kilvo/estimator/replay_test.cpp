@@ -128,6 +128,35 @@ TEST(Replay, AHeldSampleOfAnImpactIsNotTakenForTheEndOfTheRange) {
   EXPECT_LT(e.P(at::R, at::R), before(at::R, at::R) + 1e-5) << "3 rad/s of doubt would be 4e-4";
 }
 
+TEST(Replay, SweepsThatChangeTheVelocityByMoreThanItsSigmaShowHowMuchOfTheAliasedNoiseStays) {
+  Replay replay{EstimatorConfig{}};
+  for (int i = 0; i <= 400; ++i) {
+    ImuSample s = imu_at(milliseconds(5 * i));
+    s.accel.x() += i % 2 == 0 ? 20 : -20;
+    replay.add(s);
+  }
+  const auto added = [&replay] {
+    Estimate e = start();
+    e.t = begin_time + milliseconds(1990);
+    e.P.setIdentity();
+    e.P *= 1e-10;
+    const double before = e.P(at::v, at::v);
+    replay.predict_to(e, begin_time + milliseconds(2000), nullptr);
+    return e.P(at::v, at::v) - before;
+  };
+  const double least = added();
+  for (int sweep = 0; sweep < 100; ++sweep) replay.learn_aliased_share(1.0);
+  EXPECT_EQ(added(), least) << "they are what the covariance says";
+  for (int sweep = 0; sweep < 10; ++sweep) replay.learn_aliased_share(2.0);
+  const double more = added();
+  EXPECT_GT(more, 4 * least);
+  for (int sweep = 0; sweep < 100; ++sweep) replay.learn_aliased_share(1e6);
+  EXPECT_GT(added(), more);
+  EXPECT_LT(added(), 30 * least) << "no sweep that fits nowhere makes the prediction worthless";
+  for (int sweep = 0; sweep < 100; ++sweep) replay.learn_aliased_share(0.5);
+  EXPECT_EQ(added(), least);
+}
+
 TEST(Replay, AnIntervalThatIsClosedLaterIsAsIfBothEndsHadBeenKnown) {
   EstimatorConfig config;
   Replay replay(config);
