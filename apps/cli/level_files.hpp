@@ -6,7 +6,7 @@
 
 #include "apps/cli/held_output.hpp"
 #include "apps/cli/result_files.hpp"
-#include "kilvo/estimator/levelling.hpp"
+#include "apps/live/levelling.hpp"
 
 namespace kilvo::cli {
 

@@ -6,8 +6,8 @@
 
 #include "apps/cli/csv_file.hpp"
 #include "apps/cli/run_summary.hpp"
+#include "apps/live/smooth_odometry.hpp"
 #include "kilvo/estimator/output.hpp"
-#include "kilvo/estimator/smooth_odometry.hpp"
 #include "lab/evaluation/trajectory_file.hpp"
 
 namespace kilvo::cli {

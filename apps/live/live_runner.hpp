@@ -17,11 +17,11 @@
 #include "apps/live/backlog.hpp"
 #include "apps/live/handover.hpp"
 #include "apps/live/latency.hpp"
+#include "apps/live/levelling.hpp"
 #include "apps/live/raw.hpp"
 #include "apps/live/ring.hpp"
 #include "apps/live/signal.hpp"
 #include "kilvo/estimator/estimator.hpp"
-#include "kilvo/estimator/levelling.hpp"
 #include "lab/settings/live_config.hpp"
 
 namespace kilvo::live {

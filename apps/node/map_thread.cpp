@@ -2,8 +2,8 @@
 
 #include <utility>
 
+#include "apps/live/levelling.hpp"
 #include "apps/node/clouds.hpp"
-#include "kilvo/estimator/levelling.hpp"
 #include "lab/mapping/ply.hpp"
 
 namespace kilvo::node {

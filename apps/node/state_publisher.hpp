@@ -6,11 +6,11 @@
 #include <optional>
 #include <string>
 
+#include "apps/live/smooth_odometry.hpp"
 #include "apps/node/base_frame.hpp"
 #include "apps/node/body_motion.hpp"
 #include "apps/node/outlet.hpp"
 #include "apps/node/output_messages.hpp"
-#include "kilvo/estimator/smooth_odometry.hpp"
 #include "lab/settings/settings.hpp"
 
 namespace kilvo::node {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <map>
 
-#include "kilvo/estimator/levelling.hpp"
+#include "apps/live/levelling.hpp"
 #include "lab/messages/ros_types.hpp"
 #include "lab/messages/wire_reader.hpp"
 

@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <gtest/gtest.h>
 
-#include "kilvo/estimator/levelling.hpp"
+#include "apps/live/levelling.hpp"
 #include "lab/evaluation/align.hpp"
 #include "tests/live/lived.hpp"
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <thread>
 
-#include "kilvo/estimator/levelling.hpp"
+#include "apps/live/levelling.hpp"
 #include "tests/live/lived.hpp"
 
 namespace kilvo {

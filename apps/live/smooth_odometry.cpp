@@ -1,4 +1,4 @@
-#include "kilvo/estimator/smooth_odometry.hpp"
+#include "apps/live/smooth_odometry.hpp"
 
 #include <algorithm>
 #include <cmath>

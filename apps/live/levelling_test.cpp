@@ -1,4 +1,4 @@
-#include "kilvo/estimator/levelling.hpp"
+#include "apps/live/levelling.hpp"
 
 #include <gtest/gtest.h>
 
