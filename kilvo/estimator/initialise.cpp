@@ -100,7 +100,7 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   const bool is_bias = gyro.mean.norm() < usual_gyro_bias || (gyro.mean.norm() < largest_gyro_bias && gravity_stays);
   const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && is_bias && change.cwiseAbs().maxCoeff() < largest_change &&
                      accel.sigma.maxCoeff() * unit < config_.still_accel &&
-                     largest_change_of_velocity(window_, accel.mean) * unit < 3 * config_.velocity_sigma;
+                     largest_change_of_velocity(window_, accel.mean) * unit < config_.velocity_sigma;
   if (still) return start(true);
   if (s.t - *first_ >= from_seconds(config_.moving_start)) return start(false);
   return std::nullopt;

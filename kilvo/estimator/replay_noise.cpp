@@ -46,9 +46,9 @@ ProcessNoise Replay::noise_now() const {
   ProcessNoise noise = config_.noise;
   constexpr double gyro_share = 0.1;
   const double expected = noise.accel * noise.accel + 2 * noise.velocity * noise.velocity / (usual_.period * usual_.period);
-  const double stays = usual_.aliased_share * std::sqrt(std::max(0.0, usual_.accel_density2 - expected));
-  noise.accel = std::hypot(noise.accel, stays);
-  noise.accel_bias = std::hypot(noise.accel_bias, least_aliased_share * stays);
+  const double aliased = std::sqrt(std::max(0.0, usual_.accel_density2 - expected));
+  noise.accel = std::hypot(noise.accel, usual_.aliased_share * aliased);
+  noise.accel_bias = std::hypot(noise.accel_bias, least_aliased_share * least_aliased_share * aliased);
   noise.gyro = std::max(noise.gyro, gyro_share * std::sqrt(usual_.gyro_density2));
   return noise;
 }
