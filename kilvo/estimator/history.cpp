@@ -100,8 +100,9 @@ void History::rebase_to_closed() {
 
 void History::correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior) {
   replay_.correlate_with_sweep(end, shared_with_sweep<at::R>(prior, posterior), shared_with_sweep<at::p>(prior, posterior));
-  const double expected = (prior.P.diagonal() - posterior.P.diagonal()).segment<3>(at::v).sum();
-  if (expected > 0) replay_.learn_aliased_share((posterior.x.v - prior.x.v).squaredNorm() / expected);
+  const double before = prior.P.diagonal().segment<3>(at::v).sum(), expected = before - posterior.P.diagonal().segment<3>(at::v).sum();
+  const double noise = replay_.accel_noise(), added = 3 * 2 * to_seconds(end - prior.t) * noise * noise;
+  if (expected > 0) replay_.learn_aliased_share((posterior.x.v - prior.x.v).squaredNorm() / expected, std::min(1.0, before / added));
 }
 
 void History::inflate_velocity(double sigma) {

@@ -20,26 +20,24 @@ void Replay::inflate_for_missed(ImuInterval& interval, double gap) const {
   if (missed < 1) return;
   // The farther the neighbours, the farther beside; and all of them on the same side.
   const double area = missed * usual_.period * 0.5 * (missed + 1), growth = area * area / gap;
-  interval.gyro_scale += growth * usual_.gyro_bend2 / (config_.noise.gyro * config_.noise.gyro);
-  interval.accel_scale += growth * usual_.accel_bend2 / (config_.noise.accel * config_.noise.accel);
+  interval.more_gyro += growth * usual_.gyro_bend2;
+  interval.more_accel += growth * usual_.accel_bend2;
 }
 
 // Beyond the end of its range an IMU may have seen anything of the same size.
 void Replay::inflate_for_clipping(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
   constexpr double missing_gyro = 3, missing_accel = 20, correlation = 0.01;  // rad/s, m/s^2; s: for so long
-  const auto scale = [](double missing, double noise) { return missing * missing * correlation / (noise * noise); };
-  if (a.gyro_clipped || b.gyro_clipped) interval.gyro_scale = scale(missing_gyro, config_.noise.gyro);
-  if (a.accel_clipped || b.accel_clipped) interval.accel_scale = scale(missing_accel, config_.noise.accel);
+  if (a.gyro_clipped || b.gyro_clipped) interval.more_gyro = missing_gyro * missing_gyro * correlation;
+  if (a.accel_clipped || b.accel_clipped) interval.more_accel = missing_accel * missing_accel * correlation;
 }
 
 // No body turns or is pushed so much within one sample: one of the two is wrong in all that it says, or little is known of between.
 void Replay::inflate_for_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
   constexpr double largest_turn = 3, largest_push = 100;  // rad/s, m/s^2
   const double dt = to_seconds(b.t - a.t), turned = (b.gyro - a.gyro).norm(), pushed = (b.accel - a.accel).norm();
-  const auto scale = [dt](double jump, double noise) { return jump * jump * dt / (noise * noise); };
   if (turned <= largest_turn && pushed <= largest_push) return;
-  interval.gyro_scale = std::max(interval.gyro_scale, scale(turned, config_.noise.gyro));
-  interval.accel_scale = std::max(interval.accel_scale, scale(pushed, config_.noise.accel));
+  interval.more_gyro = std::max(interval.more_gyro, turned * turned * dt);
+  interval.more_accel = std::max(interval.more_accel, pushed * pushed * dt);
 }
 
 bool Replay::is_blind(Time begin, Time end) const {
@@ -65,13 +63,12 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   constexpr double least_gyro = 0.02, least_accel = 0.2;  // rad/s, m/s^2
   const double gyro2 = usual_.gyro_variance.sum() + least_gyro * least_gyro,
                accel2 = usual_.accel_variance.sum() + least_accel * least_accel;
-  interval.gyro_scale = gyro2 * gap / (config_.noise.gyro * config_.noise.gyro);
-  interval.accel_scale = accel2 * gap / (config_.noise.accel * config_.noise.accel);
-  if (gap > blind_gap) interval.accel_scale = 1;  // more is added after the prediction (inflate_covariance_over_gap)
-  constexpr double told_by_its_ends = 0.25;       // s
+  interval.more_gyro = gyro2 * gap;
+  interval.more_accel = gap > blind_gap ? 0 : accel2 * gap;  // more is added after the prediction (inflate_covariance_over_gap)
+  constexpr double told_by_its_ends = 0.25;                  // s
   if (gap > told_by_its_ends) {
     // The two samples say nothing of the time between.
-    interval.gyro_scale = 1;
+    interval.more_gyro = 0;
     interval.gyro_begin = interval.gyro_end = x.bg;
     interval.accel_begin = interval.accel_end = x.ba - x.R.inverse() * x.g;
   }
@@ -82,10 +79,10 @@ ProcessNoise Replay::noise_within(Time begin, Time end) const {
   double more = 0;
   for (std::size_t i = 1; i < imu_.size(); ++i) {
     const Time from = std::max(begin, imu_[i - 1].t), to = std::min(end, imu_[i].t);
-    if (from < to) more += to_seconds(to - from) * (interval_between(imu_[i - 1], imu_[i], from, to, {}).gyro_scale - 1);
+    if (from < to) more += to_seconds(to - from) * interval_between(imu_[i - 1], imu_[i], from, to, {}).more_gyro;
   }
   ProcessNoise out = config_.noise;
-  if (more > 0) out.gyro *= std::sqrt(1 + more / to_seconds(end - begin));
+  if (more > 0) out.gyro = std::sqrt(out.gyro * out.gyro + more / to_seconds(end - begin));
   return out;
 }
 
@@ -106,7 +103,7 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   const ProcessNoise noise = noise_now();
   const auto step = [&](ImuInterval interval) {
     // What was missed or clipped is in no mean.
-    interval.made_biases = rest_until_ && interval.end <= *rest_until_ && interval.gyro_scale == 1 && interval.accel_scale == 1;
+    interval.made_biases = rest_until_ && interval.end <= *rest_until_ && interval.more_gyro == 0 && interval.more_accel == 0;
     if (interval.begin < sweep_noise_.until) {
       interval.gyro_scale *= 1 - sweep_noise_.rotation;
       interval.velocity_scale *= 1 - sweep_noise_.position;
@@ -202,7 +199,7 @@ bool Replay::retrace(Estimate& e, const Estimate& live, Time until, Trajectory* 
   if (a.t > e.t || !std::equal(taken, taken_.end(), step, steps_.end(), is_of)) return false;
   // What is only known now that the second sample has come: a gap, a jump, the end of its range.
   const ImuInterval whole = interval_between(a, b, e.t, until, e.x);
-  if (to_seconds(b.t - a.t) > longest_gap() || whole.gyro_scale != 1 || whole.accel_scale != 1) return false;
+  if (to_seconds(b.t - a.t) > longest_gap() || whole.more_gyro > 0 || whole.more_accel > 0) return false;
   if (std::any_of(step, steps_.end(), [](const LegStep& s) { return s.gyro_bias.has_value(); })) return false;
   for (auto k = taken; k != taken_.end(); ++k, ++step) {
     const ImuInterval interval = ImuInterval::between(a, b, e.t, step->t);

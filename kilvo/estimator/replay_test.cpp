@@ -157,6 +157,27 @@ TEST(Replay, SweepsThatChangeTheVelocityByMoreThanItsSigmaShowHowMuchOfTheAliase
   EXPECT_EQ(added(), least);
 }
 
+// Beyond its range an IMU missed what it missed, however its samples alias.
+TEST(Replay, WhatClippingAddsDoesNotDependOnTheNoise) {
+  const auto added = [](double aliased) {
+    Replay replay{EstimatorConfig{}};
+    for (int i = 0; i <= 400; ++i) {
+      ImuSample s = imu_at(milliseconds(5 * i));
+      s.accel.x() += i % 2 == 0 ? aliased : -aliased;
+      s.accel_clipped = i == 400;
+      replay.add(s);
+    }
+    Estimate e = start();
+    e.t = begin_time + milliseconds(1995);
+    e.P.setIdentity();
+    e.P *= 1e-10;
+    replay.predict_to(e, begin_time + milliseconds(2000), nullptr);
+    return std::sqrt(e.P(at::v, at::v));
+  };
+  EXPECT_NEAR(added(0), 20 * std::sqrt(0.01 * 0.005), 1e-3);
+  EXPECT_NEAR(added(20), added(0), 0.02);
+}
+
 TEST(Replay, AnIntervalThatIsClosedLaterIsAsIfBothEndsHadBeenKnown) {
   EstimatorConfig config;
   Replay replay(config);

@@ -69,15 +69,14 @@ void move(const MovingRows& F, Covariance& P) {
 
 void add_process_noise(Covariance& P, const Motion& m, const Eigen::Vector3d& up_W, const FootOrientations& feet, const ProcessNoise& n,
                        const ImuInterval& interval) {
-  const double dt = m.dt, gyro_scale = interval.made_biases ? 0 : interval.gyro_scale,
-               accel_scale = interval.made_biases ? 0 : interval.accel_scale;
+  const double dt = m.dt, scale = interval.made_biases ? 0 : 1;
   const auto add = [&P](int row, int col, double value) { P.diagonal(col - row).segment<3>(std::min(row, col)).array() += value; };
-  const double accel = accel_scale * n.accel * n.accel;
-  add(at::R, at::R, gyro_scale * n.gyro * n.gyro * dt);
+  const double accel = scale * (n.accel * n.accel + interval.more_accel);
+  add(at::R, at::R, scale * interval.gyro_scale * (n.gyro * n.gyro + interval.more_gyro) * dt);
   add(at::v, at::v, accel * dt);
   add(at::p, at::v, accel * dt * dt / 2);
   add(at::v, at::p, accel * dt * dt / 2);
-  add(at::p, at::p, accel * dt * dt * dt / 3 + accel_scale * interval.velocity_scale * n.velocity * n.velocity * dt);
+  add(at::p, at::p, accel * dt * dt * dt / 3 + scale * interval.velocity_scale * n.velocity * n.velocity * dt);
   add(at::bg, at::bg, n.gyro_bias * n.gyro_bias * dt);
   add(at::ba, at::ba, n.accel_bias * n.accel_bias * dt);
   for (int foot = 0; foot < 2; ++foot) {

@@ -161,13 +161,14 @@ TEST(Predict, TheCovarianceIsTransportedByTheTransition) {
   }
 }
 
-Estimate one_second(double rate, double scale = 1) {
+Estimate one_second(double rate, double more_gyro = 0, double more_accel = 0) {
   Estimate e;
   e.t = begin_time;
   const FootOrientations standing = {SO3(), SO3()};
   for (int i = 0; i < static_cast<int>(rate); ++i) {
     ImuInterval interval = ImuInterval::hold({e.t, {0.3, -0.2, 0.5}, {0.5, 1, 9.5}}, e.t, begin_time + from_seconds((i + 1) / rate));
-    interval.gyro_scale = interval.accel_scale = scale;
+    interval.more_gyro = more_gyro;
+    interval.more_accel = more_accel;
     e = test::predict(e, interval, standing, {});
   }
   return e;
@@ -194,10 +195,11 @@ TEST(Predict, NoiseDensitiesMeanWhatTheirUnitsSay) {
   EXPECT_NEAR(sigma(at::R), std::sqrt(n.gyro * n.gyro + n.gyro_bias * n.gyro_bias / 3), 1e-3 * n.gyro);
 }
 
-TEST(Predict, NoiseScaleMultipliesTheVarianceOfTheImuOnly) {
+TEST(Predict, WhatTheImuMissedIsAddedToTheNoiseOfTheImuOnly) {
   const ProcessNoise n;
-  const Covariance P = one_second(200, 100).P;
+  const Covariance P = one_second(200, 99 * n.gyro * n.gyro, 0.3 * 0.3).P, usual = one_second(200).P;
   EXPECT_NEAR(std::sqrt(P(at::R, at::R)), 10 * n.gyro, 1e-2 * n.gyro);
+  EXPECT_NEAR(P(at::v, at::v) - usual(at::v, at::v), 0.3 * 0.3, 1e-3);
   EXPECT_NEAR(std::sqrt(P(at::ba, at::ba)), n.accel_bias, 1e-6 * n.accel_bias);
 }
 
