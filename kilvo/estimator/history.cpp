@@ -33,15 +33,10 @@ void History::begin(const Estimate& first, std::optional<Time> rest_until) {
   begun_ = true;
 }
 
-Estimate History::at(Time t) {
-  Estimate e = replay_.nearest(t, base_);
-  replay_.advance(e, t, &trajectory_);
-  return e;
-}
-
-void History::record_from(const Estimate& e, Time until) {
+Estimate History::record_from(const Estimate& e, Time until) {
   Estimate ahead = replay_.nearest(until, e);
   replay_.advance(ahead, until, &trajectory_);
+  return ahead;
 }
 
 std::optional<History> History::doubted(Time middle, Time end, std::optional<double> off) const {
@@ -98,11 +93,10 @@ void History::rebase_to_closed() {
   replay_.forget_before(base_.t);
 }
 
-void History::correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior) {
+void History::correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior, bool alone) {
   replay_.correlate_with_sweep(end, shared_with_sweep<at::R>(prior, posterior), shared_with_sweep<at::p>(prior, posterior));
-  const double before = prior.P.diagonal().segment<3>(at::v).sum(), expected = before - posterior.P.diagonal().segment<3>(at::v).sum();
-  const double noise = replay_.accel_noise(), added = 3 * 2 * to_seconds(end - prior.t) * noise * noise;
-  if (expected > 0) replay_.learn_aliased_share((posterior.x.v - prior.x.v).squaredNorm() / expected, std::min(1.0, before / added));
+  const double expected = (prior.P.diagonal() - posterior.P.diagonal()).segment<3>(at::v).sum();
+  if (expected > 0) replay_.learn_aliased_share(alone ? (posterior.x.v - prior.x.v).squaredNorm() / expected : 0);
 }
 
 void History::inflate_velocity(double sigma) {

@@ -33,13 +33,13 @@ class History {
   const Trajectory& trajectory() const { return trajectory_; }
 
   /// The estimate of a time not before the base. What was passed on the way is in the trajectory.
-  Estimate at(Time t);
+  Estimate at(Time t) { return record_from(base_, t); }
   /// For a sweep around `middle` until `end`: the same, but that what the accelerometer reported since the base is wrong; or, if the sweep
   /// is `off` by so much (m), that the velocity of the base is less certain. None when it was too long ago, or that is too much. Its now()
   /// and closed() are what they are here.
   std::optional<History> doubted(Time middle, Time end, std::optional<double> off) const;
-  /// Puts the poses from `e` to `until` into the trajectory.
-  void record_from(const Estimate& e, Time until);
+  /// The estimate at `until` if it was `e` before. The poses on the way are in the trajectory.
+  Estimate record_from(const Estimate& e, Time until);
   /// How the IMU moved from `t` to the base: its poses at both, as the trajectory has them; the same when `t` is not before the base. None
   /// when it is too long before.
   struct Motion {
@@ -76,9 +76,9 @@ class History {
   void rebase_to_closed();
   /// The pose at the time of `e` is that of `e`, its velocity has changed by `dv_W`: relative motion before stays what it was.
   void correct_trajectory(const Estimate& e, const Eigen::Vector3d& dv_W) { trajectory_.correct(e.t, e.x.pose(), dv_W); }
-  /// A sweep until `end` took `prior` to `posterior`, of its middle: see Replay::correlate_with_sweep and
-  /// learn_aliased_share.
-  void correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior);
+  /// A sweep until `end` took `prior` to `posterior`, of its middle: see Replay::correlate_with_sweep and,
+  /// where nothing else has moved the velocity (`alone`), learn_aliased_share.
+  void correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior, bool alone);
   /// The velocity is less certain than the covariance says, by this standard deviation, m/s.
   void inflate_velocity(double sigma);
 

@@ -63,7 +63,7 @@ class Replay {
   void correlate_with_sweep(Time end, double rotation, double position) { sweep_noise_ = {end, rotation, position}; }
 
   /// A sweep changed the velocity by so much, squared, per variance of what it was to change it by.
-  void learn_aliased_share(double normalised, double weight);
+  void learn_aliased_share(double normalised);
 
   /// The robot stood still until `end`, if it did, and the first biases are the means of what the IMU said until then.
   void began_at_rest(std::optional<Time> end) { rest_until_ = end; }

@@ -53,13 +53,12 @@ ProcessNoise Replay::noise_now() const {
   return noise;
 }
 
-// R. K. Mehra, "On the identification of variances and adaptive Kalman filtering", 1970: innovations that are larger than the covariance
-// says tell how much of the noise stays. Impacts, which the next samples take back, are the least; vibration near a multiple of the rate
-// the most.
-void Replay::learn_aliased_share(double normalised, double weight) {
-  constexpr double sweeps = 5, most = 2;
-  const double next = usual_.aliased_share * std::sqrt(1 + weight * (std::min(normalised, sweeps) - 1) / sweeps);
-  usual_.aliased_share = std::clamp(next, least_aliased_share, most);
+// R. K. Mehra, "On the identification of variances and adaptive Kalman filtering", 1970. The next samples take back impacts, but not
+// vibration near a multiple of the rate.
+void Replay::learn_aliased_share(double normalised) {
+  constexpr double sweeps = 5;
+  const double next = usual_.aliased_share * std::sqrt(1 + (std::min(normalised, sweeps) - 1) / sweeps);
+  usual_.aliased_share = std::clamp(next, least_aliased_share, 1 / least_aliased_share);
 }
 
 }  // namespace kilvo

@@ -21,11 +21,11 @@ void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservab
 
 // Where the prior is uncertain for what the accelerometer reported alone, the sweep fits where nothing has pushed the robot; where it fits,
 // a push was not what was reported, and the velocity that it gave is not known.
-Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, History& history, Estimate& prior,
+Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool alone, History& history, Estimate& prior,
                                       PointDrops& drops) const {
   const PoseCovariance error = error_at(prior.x.pose());
   const ProcessNoise noise = history.replay().noise_within(prior.t - (end - prior.t), end);
-  Registration sweep = lidar.measure(scan, {end, prior, history.trajectory(), noise, error}, surfaces_, drops);
+  Registration sweep = lidar.measure(scan, {end, prior, history.trajectory(), noise, error, alone}, surfaces_, drops);
   const bool is_surprised = lidar.is_surprised(prior, sweep, error);
   if ((sweep.refused != Reason::fits_nowhere && !is_surprised) || (sweep.refused && !sweep.searched)) return sweep;
   auto doubted = history.doubted(prior.t, end, sweep.refused ? std::nullopt : std::optional((sweep.posterior.x.p - prior.x.p).norm()));
@@ -34,7 +34,7 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& sca
   doubted->record_from(expected, end);
   PointDrops counted;
   const PoseCovariance error_there = error_at(expected.x.pose());
-  Registration again = lidar.measure(scan, {end, expected, doubted->trajectory(), noise, error_there}, surfaces_, counted);
+  Registration again = lidar.measure(scan, {end, expected, doubted->trajectory(), noise, error_there, alone}, surfaces_, counted);
   if (again.refused || !again.carries || (!sweep.refused && !LidarPipeline::agrees(expected, again, error_there))) return sweep;
   history = std::move(*doubted);
   prior = expected;

@@ -25,8 +25,8 @@ class WorldMap {
   const MapError& error() const { return error_; }
 
   /// Registers a sweep until `end` from `prior`, of its middle. Where it is not for what the accelerometer reported, that is doubted: then
-  /// `history` and `prior` become what they are without. `drops`: counts the points that are not used.
-  Registration register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, History& history, Estimate& prior,
+  /// `history` and `prior` become what they are without. `alone`: see LidarPipeline::Context. `drops`: counts the points that are not used.
+  Registration register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool alone, History& history, Estimate& prior,
                               PointDrops& drops) const;
   /// A sweep fitted nowhere. True when that has lasted: the robot is taken to be outside of the map, and it begins anew around `prior`,
   /// unless it was given.

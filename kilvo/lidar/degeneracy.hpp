@@ -11,6 +11,7 @@ namespace kilvo {
 struct Degeneracy {
   Eigen::Matrix<double, 6, 6> weak =
       Eigen::Matrix<double, 6, 6>::Zero();  // unit directions, scaled (rotation * lever, position), in columns
+  Eigen::Matrix<double, 6, 1> real = Eigen::Matrix<double, 6, 1>::Zero();  // information along each, without what is faked, 1/m^2
   int weak_count = 0;
   double lever = 1;           // m per rad
   double smallest_share = 1;  // of the weakest direction, after subtraction, in the information of all three of position
@@ -26,7 +27,7 @@ Eigen::Matrix<double, 6, 6> weak_part(const Degeneracy& degeneracy);
 
 /// Takes the weak directions out of A and b. The map knows where they point only to some milliradians, so when the prior is uncertain by
 /// metres along one of them, the others are trusted to that fraction of it and no better: else every millimetre measured across would
-/// become a decimetre along.
-void project_out(const Degeneracy& degeneracy, const PoseCovariance& prior, Information<6>& info);
+/// become a decimetre along. `alone`: nothing else measures along them, and what is not faked is kept, as far as it can be believed.
+void project_out(const Degeneracy& degeneracy, const PoseCovariance& prior, bool alone, Information<6>& info);
 
 }  // namespace kilvo

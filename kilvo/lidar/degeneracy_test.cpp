@@ -114,11 +114,33 @@ TEST(Degeneracy, FakedInformationDoesNotCount) {
   EXPECT_NEAR(std::abs(d.weak(3, 0)), 1, 1e-9);
 }
 
+// b of an error along x is what real rows make of it; faked rows see none of it.
+TEST(Degeneracy, AloneWhatIsNotFakedIsKeptAndTellsTheWholeError) {
+  constexpr double real = 800, faked = 100, error = 0.02;
+  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Identity() * 1e6, fake = Eigen::Matrix<double, 6, 6>::Zero();
+  A(3, 3) = real + 2 * faked;
+  fake(3, 3) = faked;
+  const Degeneracy d = find_degeneracy(A, fake, 0.002);
+  ASSERT_EQ(d.weak_count, 1);
+  EXPECT_NEAR(d.real[0], real, 1e-6);
+  const auto projected = [&](bool alone) {
+    Information<6> info;
+    info.A = A;
+    info.b(3) = real * error;
+    project_out(d, Eigen::Matrix<double, 6, 6>::Identity() * 1e-6, alone, info);
+    return info;
+  };
+  EXPECT_NEAR(projected(false).A(3, 3), 0, 1e-6);
+  const Information<6> kept = projected(true);
+  EXPECT_NEAR(kept.b(3) / kept.A(3, 3), error, 1e-9);
+  EXPECT_NEAR(kept.A(3, 3), real * real / (real + 2 * faked) / 10, 1e-6) << "ten sweeps err alike";
+}
+
 TEST(Degeneracy, WithoutAnyInformationNothingBreaks) {
   const Eigen::Matrix<double, 6, 6> none = Eigen::Matrix<double, 6, 6>::Zero();
   const Degeneracy d = find_degeneracy(none, none, 0.002);
   Information<6> info;
-  project_out(d, none, info);
+  project_out(d, none, false, info);
   EXPECT_TRUE(info.A.allFinite());
   EXPECT_EQ(weak_part(d).norm(), 0);
 }
@@ -132,7 +154,7 @@ TEST(Degeneracy, ProjectingOutLeavesNothingAlongTheWeakDirectionInAnyUnits) {
   Information<6> info;
   info.A = 1e6 * random.covariance<6>(1);
   info.b = 1e3 * random.vector<6>();
-  project_out(d, Eigen::Matrix<double, 6, 6>::Identity() * 1e-6, info);
+  project_out(d, Eigen::Matrix<double, 6, 6>::Identity() * 1e-6, false, info);
   Eigen::Matrix<double, 6, 1> own = d.weak.col(0);
   own.head<3>() /= d.lever;  // the pose error (rad, m) along it
   EXPECT_LT((info.A * own).norm(), 1e-9 * info.A.norm());

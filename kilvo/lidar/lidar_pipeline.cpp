@@ -77,6 +77,7 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
   constexpr double to_leave = 3.0;
   if (is_blind_somewhere()) config.weak_share *= to_leave;
   LidarModel model(map, out.clusters, mount_.T_imu_lidar.p, context.map_error, config, workers_);
+  if (context.alone) model.keep_weak();
   if (map.empty()) {
     out.carries = true;
   } else {

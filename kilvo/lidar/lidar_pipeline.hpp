@@ -62,6 +62,7 @@ class LidarPipeline {
     const Trajectory& trajectory;     // covers it
     const ProcessNoise& noise;        // of the IMU within it
     const PoseCovariance& map_error;  // of the map around the prior
+    bool alone = false;               // neither legs nor images measure what a sweep does not hold
   };
   /// An empty map takes the sweep as it is. `drops`: counts the points that are not used.
   Registration measure(const LidarScan& scan, const Context& context, const VoxelMap& map, PointDrops& drops);

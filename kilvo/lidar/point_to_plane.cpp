@@ -216,7 +216,7 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   report_.chi2_per_row = info.rows > 0 ? info.chi2 / info.rows : 0;
   if (first_) report_.degeneracy = find_degeneracy(info.A, sums.fake.selfadjointView<Eigen::Lower>(), config_.weak_share);
   first_ = false;
-  project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), info);
+  project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), keeps_weak_, info);
   return info;
 }
 

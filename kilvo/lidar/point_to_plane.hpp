@@ -38,6 +38,8 @@ class LidarModel {
   LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const PoseCovariance& map_error,
              const LidarConfig& config, const Workers& workers);
 
+  /// Nothing else measures what the sweep hardly holds: what of it is not faked is kept.
+  void keep_weak() { keeps_weak_ = true; }
   Information<6> operator()(const State& x, const Covariance& prior);
 
   const RegistrationReport& report() const { return report_; }
@@ -86,7 +88,7 @@ class LidarModel {
   std::vector<Place> places_;
   std::vector<Association> associations_;
   std::vector<std::uint16_t> rows_of_node_;
-  bool first_ = true;
+  bool first_ = true, keeps_weak_ = false;
   RegistrationReport report_;
 };
 
