@@ -9,6 +9,8 @@
 
 namespace kilvo {
 
+constexpr double correlation = 0.01;  // s, for which an IMU misses or gets wrong the same
+
 void Replay::add(const ImuSample& s) {
   note_usual(s);
   imu_.push_back(s);
@@ -24,20 +26,16 @@ void Replay::inflate_for_missed(ImuInterval& interval, double gap) const {
   interval.more_accel += growth * usual_.accel_bend2;
 }
 
-// Beyond the end of its range an IMU may have seen anything of the same size.
-void Replay::inflate_for_clipping(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
-  constexpr double missing_gyro = 3, missing_accel = 20, correlation = 0.01;  // rad/s, m/s^2; s: for so long
+// Beyond the end of its range an IMU may have seen anything of the same size. And no body turns or is pushed so much within one sample, or
+// so far from what is usual: samples are wrong, or little is known of between.
+void Replay::inflate_for_faults(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
+  constexpr double missing_gyro = 3, missing_accel = 20, largest_turn = 3, largest_push = 100;  // rad/s, m/s^2
   if (a.gyro_clipped || b.gyro_clipped) interval.more_gyro = missing_gyro * missing_gyro * correlation;
   if (a.accel_clipped || b.accel_clipped) interval.more_accel = missing_accel * missing_accel * correlation;
-}
-
-// No body turns or is pushed so much within one sample: one of the two is wrong in all that it says, or little is known of between.
-void Replay::inflate_for_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
-  constexpr double largest_turn = 3, largest_push = 100;  // rad/s, m/s^2
-  const double dt = to_seconds(b.t - a.t), turned = (b.gyro - a.gyro).norm(), pushed = (b.accel - a.accel).norm();
+  const double turned = (b.gyro - a.gyro).norm(), pushed = std::max((b.accel - a.accel).norm(), (b.accel - usual_.accel_mean).norm());
   if (turned <= largest_turn && pushed <= largest_push) return;
-  interval.more_gyro = std::max(interval.more_gyro, turned * turned * dt);
-  interval.more_accel = std::max(interval.more_accel, pushed * pushed * dt);
+  interval.more_gyro = std::max(interval.more_gyro, turned * turned * correlation);
+  interval.more_accel = std::max(interval.more_accel, pushed * pushed * correlation);
 }
 
 bool Replay::is_blind(Time begin, Time end) const {
@@ -54,8 +52,7 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   ImuInterval interval = ImuInterval::between(a, b, begin, end);
   const double gap = to_seconds(b.t - a.t);
   if (gap <= longest_gap()) {
-    inflate_for_clipping(interval, a, b);
-    inflate_for_jump(interval, a, b);
+    inflate_for_faults(interval, a, b);
     inflate_for_missed(interval, gap);
     return interval;
   }

@@ -103,8 +103,7 @@ class Replay {
 
   LegModel::Used apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept = nullptr) const;
   bool retrace(Estimate& e, const Estimate& live, Time until, Trajectory* record) const;
-  void inflate_for_jump(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
-  void inflate_for_clipping(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
+  void inflate_for_faults(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
   void inflate_for_missed(ImuInterval& interval, double gap) const;
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
   FootOrientations standing_at(Time t) const;
