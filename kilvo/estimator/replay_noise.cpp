@@ -41,14 +41,16 @@ void Replay::note_usual(const ImuSample& s) {
 double Replay::longest_gap() const { return std::max(config_.max_imu_gap, periods_of_a_gap * usual_.period); }
 
 // What varies faster than the rate of the IMU is folded into it. As far as it is more than the settings say, a share of it stays in the
-// integral, and a part of that each second in a bias: samples that are in step with the robot's steps add up.
+// integral, and where it is more than half a second of samples shows by chance, a part of that each second in a bias: samples that are in
+// step with the robot's steps add up.
 ProcessNoise Replay::noise_now() const {
   ProcessNoise noise = config_.noise;
   constexpr double gyro_share = 0.1;
   const double expected = noise.accel * noise.accel + 2 * noise.velocity * noise.velocity / (usual_.period * usual_.period);
   const double aliased = std::sqrt(std::max(0.0, usual_.accel_density2 - expected));
   noise.accel = std::hypot(noise.accel, usual_.aliased_share * aliased);
-  noise.accel_bias = std::hypot(noise.accel_bias, least_aliased_share * least_aliased_share * aliased);
+  if (usual_.accel_density2 > 1.5 * expected)
+    noise.accel_bias = std::hypot(noise.accel_bias, least_aliased_share * least_aliased_share * aliased);
   noise.gyro = std::max(noise.gyro, gyro_share * std::sqrt(usual_.gyro_density2));
   return noise;
 }

@@ -30,7 +30,7 @@ struct LidarConfig {
               "of map.voxel_size"},
         Field{"gate", &LidarConfig::gate, "sigma", "rows farther from their plane than this are not used"},
         Field{"weak_share", &LidarConfig::weak_share, "-",
-              "a direction with less than this share of a sweep's information on position is not updated"},
+              "a direction with less than this share of a sweep's information on position is left to legs and images"},
         Field{"least_ratio", &LidarConfig::least_ratio, "-",
               "a scan that is flatter (smallest eigenvalue of the points' scatter over the largest) is not used, and the "
               "modality changes as if it were lost; 0: never"},
