@@ -154,7 +154,7 @@ class LiveTest(unittest.TestCase):
                             (("--mode-pr", "1"), "mode_pr is 1: ankles and waist are angles of motors"),
                             (("--mode-machine", "9"), "mode_machine 9 is no robot")):
             STORY.play("--only", "legs", "--legs", "lowstate", "--seconds", "1", *words).process.wait(30)
-            self.assertIn(text, live.said())
+            self.assertTrue(wait_until(lambda text=text: text in live.said()), live.said())
         dog = STORY.peer("wrong-type", STORY.domain, "2", "rt/lowstate", "unitree_go::msg::dds_::LowState_")
         self.assertTrue(wait_until(lambda: "(Go2, B2, H1): its legs are not read" in live.said()), live.said())
         dog.end()
