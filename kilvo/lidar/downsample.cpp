@@ -61,15 +61,19 @@ class CellTable {
     }
   }
 
-  std::optional<std::uint32_t> find(VoxelKey key) const {
-    for (std::size_t i = home(key); slots_[i] != empty; i = (i + 1) & mask_) {
-      if (keys_[slots_[i]] == key) return slots_[i];
+  // The cell beyond the upper face along this axis, if it has points.
+  std::optional<std::uint32_t> above(std::size_t cell, int axis) const {
+    const VoxelKey key = keys_[cell], one = VoxelKey{1} << (key_bits * axis), field = (one << key_bits) - one;
+    const VoxelKey beside = (key & ~field) | ((key + one) & field);
+    for (std::size_t i = home(beside); slots_[i] != empty; i = (i + 1) & mask_) {
+      if (keys_[slots_[i]] == beside) return slots_[i];
     }
     return std::nullopt;
   }
 
   std::vector<Cell>& cells() { return cells_; }
   const std::vector<Cell>& cells() const { return cells_; }
+  VoxelKey key_of(std::size_t cell) const { return keys_[cell]; }
 
  private:
   static constexpr std::uint32_t empty = VoxelIndex::none;
@@ -98,39 +102,46 @@ class CellTable {
   std::size_t mask_;
 };
 
-// The mean of each cell, in cells, in the world.
-std::vector<Eigen::Vector3d> means_of(const std::vector<Cell>& cells, const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
-  std::vector<Eigen::Vector3d> means;
-  means.reserve(cells.size());
-  for (const Cell& c : cells) means.emplace_back(R * (c.first() + c.sum() / c.count()).cast<double>() + t);
+// Cells of the grid: x -> floor(R x + t), R and t in cells.
+struct Grid {
+  Eigen::Matrix3d R;
+  Eigen::Vector3d t;
+};
+
+// The mean of each cell from its lower corner on, in cells.
+std::vector<Eigen::Vector3f> means_of(const CellTable& table, const Grid& grid) {
+  std::vector<Eigen::Vector3f> means;
+  means.reserve(table.cells().size());
+  for (std::size_t i = 0; i < table.cells().size(); ++i) {
+    const Cell& c = table.cells()[i];
+    const Eigen::Vector3d w = grid.R * (c.first() + c.sum() / c.count()).cast<double>() + grid.t;
+    const VoxelKey key = table.key_of(i);
+    const auto low = [key](int axis) { return static_cast<double>(coordinate_of(key, axis)); };
+    means.emplace_back((w - Eigen::Vector3d(low(0), low(1), low(2))).cast<float>());
+  }
   return means;
 }
 
 // Of each cell the index of the cell that its points belong to: itself, or the fuller neighbour across a face, where both their means are
 // within `reach` (in cells) of that face. A surface along a face is cut in two by its noise: the few points beyond would be a cluster of
 // their own, far off the surface, and those that stayed would lean the other way.
-std::vector<std::uint32_t> owners_of(const CellTable& table, const Eigen::Matrix3d& R, const Eigen::Vector3d& t, double reach) {
+std::vector<std::uint32_t> owners_of(const CellTable& table, const Grid& grid, float reach) {
   const std::vector<Cell>& cells = table.cells();
-  const std::vector<Eigen::Vector3d> means = means_of(cells, R, t);
+  const std::vector<Eigen::Vector3f> means = means_of(table, grid);
   std::vector<std::uint32_t> owner(cells.size());
+  for (std::uint32_t i = 0; i < cells.size(); ++i) owner[i] = i;
+  // Fuller, or first among equals: no two own each other.
+  const auto offer = [&](std::uint32_t& to, std::uint32_t other) {
+    const float count = cells[other].count(), best = cells[to].count();
+    if (count > best || (count == best && other < to)) to = other;
+  };
   for (std::uint32_t i = 0; i < cells.size(); ++i) {
-    owner[i] = i;
-    const Eigen::Vector3d& w = means[i];
-    const std::array<std::int64_t, 3> at = {fast_floor(w.x()), fast_floor(w.y()), fast_floor(w.z())};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const int k = static_cast<int>(axis);
-      const double into = w[k] - static_cast<double>(at[axis]);
-      if (into > reach && into < 1 - reach) continue;
-      const std::int64_t side = into > 0.5 ? 1 : -1;
-      auto beside = at;
-      beside[axis] += side;
-      const auto other = table.find(pack_key(beside[0], beside[1], beside[2]));
-      if (!other) continue;
-      const double face = static_cast<double>(side > 0 ? at[axis] + 1 : at[axis]);
-      if (std::abs(means[*other][k] - face) > reach) continue;
-      const float best = cells[owner[i]].count();
-      // Fuller, or first among equals: no two own each other.
-      if (cells[*other].count() > best || (cells[*other].count() == best && *other < owner[i])) owner[i] = *other;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (means[i][axis] < 1 - reach) continue;
+      const auto other = table.above(i, axis);
+      if (!other || means[*other][axis] > reach) continue;
+      offer(owner[i], *other);
+      offer(owner[*other], i);
     }
   }
   for (std::uint32_t i = 0; i < cells.size(); ++i) {
@@ -157,12 +168,6 @@ void join(const Cell& from, Cell& to) {
   c.outer_a += Float4{d[0], d[0], d[0], d[1]} * Float4{d[0], d[1], d[2], d[1]};
   c.outer_b += Float4{d[1], d[2], d[1], d[2]} * Float4{d[2], d[2], d[2], d[2]};
 }
-
-// Cells of the grid: x -> floor(R x + t), R and t in cells.
-struct Grid {
-  Eigen::Matrix3d R;
-  Eigen::Vector3d t;
-};
 
 // floor() of what is below 2^31.
 [[gnu::always_inline]] inline void floor_of(const Double4& x, Long4& out) {
@@ -227,7 +232,7 @@ std::vector<PointCluster> downsample(std::span<const PointXYZI> points, const SE
   const Grid grid{T_WI.R.matrix() / cell, T_WI.p / cell};
   gather(points, grid, table);
   std::vector<Cell>& cells = table.cells();
-  const std::vector<std::uint32_t> owner = owners_of(table, grid.R, grid.t, std::min(reach / cell, 0.25));
+  const std::vector<std::uint32_t> owner = owners_of(table, grid, static_cast<float>(std::min(reach / cell, 0.25)));
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (owner[i] != i) join(cells[i], cells[owner[i]]);
   }

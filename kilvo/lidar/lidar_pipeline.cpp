@@ -19,6 +19,10 @@ constexpr double known_share = 0.2;
 // Fewer rows, or more directions than these that they do not hold: not worth the name of a registration.
 constexpr int fewest_rows = 30, most_weak = 3;
 
+// A row is linear in the position, and in the rotation but for its square: after a step below these another evaluation would meet the same
+// planes and move the pose by hundredths of a millimetre.
+constexpr double negligible_turn = 5e-4, negligible_step = 3e-3;  // rad, m
+
 // Of chi-square with six degrees of freedom.
 constexpr double six_at_99_9 = 22.46;
 
@@ -102,6 +106,8 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
 // From planes that are the nearest at the prior.
 void LidarPipeline::track(const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out) const {
   UpdateConfig patient = update_;
+  patient.rotation_step = std::max(patient.rotation_step, negligible_turn);
+  patient.position_step = std::max(patient.position_step, negligible_step);
   if (is_rejoining()) patient.max_iterations *= 3;
   const PoseCovariance noise = is_rejoining() ? within_scan.V + noise_of_velocity(prior.P, mount_.rate) : within_scan.V;
   const auto measured = [&](const State& x, const Covariance& P) {

@@ -48,7 +48,9 @@ LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> cluste
       workers_(workers),
       places_(clusters.size()),
       associations_(clusters.size()),
-      rows_of_node_(map.node_capacity(), 0) {}
+      plane_of_node_(map.node_capacity(), VoxelIndex::none) {
+  rows_of_plane_.reserve(clusters.size());
+}
 
 bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluster, const Iterate& at, Association& out) const {
   const Plane& plane = *match.plane;
@@ -61,14 +63,21 @@ bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluste
   const double rough = static_cast<double>(plane.roughness_variance);
   const double variance = sensor / static_cast<double>(cluster.count) + rough;
   const double plane_variance = plane.variance_at(x_W);
-  const double gate = variance + plane_variance + row.J.dot(at.P * row.J);
-  if (row.r * row.r > config_.gate * config_.gate * gate) return false;
+  const double gate2 = config_.gate * config_.gate, r2 = row.r * row.r;
+  // The pose's uncertainty only widens the gate: it is worked out for the few rows that need it.
+  if (r2 > gate2 * (variance + plane_variance) && r2 > gate2 * (variance + plane_variance + row.J.dot(at.P * row.J))) return false;
   if (cluster.count >= thickness_min_count) {
     const Eigen::Vector3f n = n_I.cast<float>();
     const double thickness = static_cast<double>(n.dot(cluster.scatter_matrix() * n) / cluster.count);
     if (thickness > thickness_sigmas2 * (sensor + rough)) return false;
   }
-  out = {&plane, match.node, match.epoch, 0, variance, plane_variance, row, n_I};
+  out.plane = &plane;
+  out.node = match.node;
+  out.epoch = match.epoch;
+  out.variance = variance;
+  out.plane_variance = plane_variance;
+  out.row = row;
+  out.n_I = n_I;
   return true;
 }
 
@@ -90,24 +99,22 @@ void LidarModel::look_up_planes(std::size_t first, std::size_t last, const SE3& 
   for (std::size_t k = 0; k < count; ++k) places_[wanted[k]].plane = found[k];
 }
 
-LidarModel::Association LidarModel::associate(std::size_t i, const Iterate& at, int& rejected) const {
+// False for a cluster that met a surface which it does not lie on. `out` has no plane unless it lies on one.
+bool LidarModel::associate(std::size_t i, const Iterate& at, Association& out) const {
   const PointCluster& cluster = clusters_[i];
-  Association found;
+  out.plane = nullptr;
   const VoxelMap::Match& place = places_[i].plane;
-  if (place.plane != nullptr && accept(place, cluster, at, found)) return found;
+  if (place.plane != nullptr && accept(place, cluster, at, out)) return true;
   bool seen = false;
   const auto try_at = [&](const Eigen::Vector3d& x) {
     return map_.visit_planes(x, [&](const VoxelMap::Match& m) {
       seen = true;
-      return accept(m, cluster, at, found);
+      return accept(m, cluster, at, out);
     });
   };
   const Eigen::Vector3d x = at.T_WI * cluster.mean.cast<double>();
-  if (place.plane != nullptr) {
-    // Its own voxels hold a surface. If it is another one, at every depth, it is no business of the neighbours.
-    rejected += try_at(x) ? 0 : 1;
-    return found;
-  }
+  // Its own voxels hold a surface. If it is another one, at every depth, it is no business of the neighbours.
+  if (place.plane != nullptr) return try_at(x);
   // Nothing known here yet: the nearest neighbour leaf, across the face that the point is closest to.
   const double leaf = map_.leaf_size();
   Eigen::Vector3d offset;
@@ -116,9 +123,24 @@ LidarModel::Association LidarModel::associate(std::size_t i, const Iterate& at, 
   offset.cwiseAbs().maxCoeff(&axis);
   Eigen::Vector3d beside = x;
   beside[axis] += offset[axis] > 0 ? leaf : -leaf;
-  try_at(beside);
-  rejected += seen && found.plane == nullptr ? 1 : 0;
-  return found;
+  return try_at(beside) || !seen;
+}
+
+void LidarModel::count_rows_of_planes() {
+  rows_of_plane_.clear();
+  for (Association& a : associations_) {
+    if (a.plane == nullptr) continue;
+    std::uint32_t& place = plane_of_node_[a.node];
+    if (place == VoxelIndex::none) {
+      place = static_cast<std::uint32_t>(rows_of_plane_.size());
+      rows_of_plane_.push_back(0);
+    }
+    a.shared = place;
+    ++rows_of_plane_[place];
+  }
+  for (const Association& a : associations_) {
+    if (a.plane != nullptr) plane_of_node_[a.node] = VoxelIndex::none;
+  }
 }
 
 // Rows of a block on their way into the sums.
@@ -166,7 +188,7 @@ void LidarModel::add_row(std::size_t i, const SE3& T_WI, Sums& sums) {
   if (a.plane == nullptr) return;
   Waiting& waiting = *sums.waiting;
   // k rows of one plane share its error: each carries k times its variance, so that together they average it not at all.
-  const double variance = a.variance + rows_of_node_[a.node] * a.plane_variance;
+  const double variance = a.variance + rows_of_plane_[a.shared] * a.plane_variance;
   const double z = std::abs(a.row.r) / std::sqrt(a.variance + a.plane_variance);
   a.weight = (z > robust_sigmas ? robust_sigmas / z : 1.0) / (robust_cost * variance);
   waiting.rows[waiting.row_count++] = {a.row.J, a.weight, a.row.r};
@@ -188,12 +210,10 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   report_.rejected = workers_.sum(clusters_.size(), at_once, 0, [&](std::size_t first, std::size_t last) {
     int rejected = 0;
     look_up_planes(first, last, T_WI);
-    for (std::size_t i = first; i < last; ++i) associations_[i] = associate(i, at, rejected);
+    for (std::size_t i = first; i < last; ++i) rejected += associate(i, at, associations_[i]) ? 0 : 1;
     return rejected;
   });
-  for (const Association& a : associations_) {
-    if (a.plane != nullptr) ++rows_of_node_[a.node];
-  }
+  count_rows_of_planes();
   Sums sums = workers_.sum(associations_.size(), at_once, Sums{}, [&](std::size_t first, std::size_t last) {
     Waiting waiting;
     Sums part;
@@ -202,10 +222,6 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
     part.add_up();
     return part;
   });
-  for (const Association& a : associations_) {
-    if (a.plane != nullptr) rows_of_node_[a.node] = 0;
-  }
-
   Information<6> info;
   info.columns = {at::R, at::R + 1, at::R + 2, at::p, at::p + 1, at::p + 2};
   info.A = sums.A.selfadjointView<Eigen::Lower>();
@@ -220,19 +236,32 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   return info;
 }
 
+namespace {
+
+// R S R', symmetric to the bit.
+Eigen::Matrix3d rotated(const Eigen::Matrix3d& R, const Eigen::Matrix3d& S) {
+  const Eigen::Matrix3d T = R * S;
+  Eigen::Matrix3d out;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j) out(i, j) = out(j, i) = T(i, 0) * R(j, 0) + T(i, 1) * R(j, 1) + T(i, 2) * R(j, 2);
+  }
+  return out;
+}
+
+}  // namespace
+
 std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL,
                                  const LidarConfig& config) {
-  std::vector<PointGroup> groups;
-  groups.reserve(clusters.size());
+  std::vector<PointGroup> groups(clusters.size());
   const Eigen::Matrix3d& R = T_WI.R.matrix();
-  for (const PointCluster& c : clusters) {
-    PointGroup g;
+  for (std::size_t i = 0; i < clusters.size(); ++i) {
+    const PointCluster& c = clusters[i];
+    PointGroup& g = groups[i];
     const Eigen::Vector3d p_I = c.mean.cast<double>();
     g.mean = T_WI * p_I;
     g.count = static_cast<double>(c.count);
-    g.scatter = R * c.scatter_matrix().cast<double>() * R.transpose();
+    g.scatter = rotated(R, c.scatter_matrix().cast<double>());
     g.noise = point_noise(R * (p_I - p_IL), config);
-    groups.push_back(g);
   }
   return groups;
 }

@@ -56,6 +56,7 @@ class LidarModel {
     const Plane* plane = nullptr;
     std::uint32_t node = 0;
     std::uint32_t epoch = 0;
+    std::uint32_t shared = 0;   // its place in rows_of_plane_: clusters on the same plane have the same
     double weight = 0;          // 1/m^2, of the last evaluation
     double variance = 0;        // of the cluster's mean along the normal: measurement and roughness, m^2
     double plane_variance = 0;  // of the plane under it, common to all clusters of the plane, m^2
@@ -75,7 +76,8 @@ class LidarModel {
     PoseCovariance P;
   };
   void look_up_planes(std::size_t first, std::size_t last, const SE3& T_WI);
-  Association associate(std::size_t i, const Iterate& at, int& rejected) const;
+  bool associate(std::size_t i, const Iterate& at, Association& out) const;
+  void count_rows_of_planes();
   bool accept(const VoxelMap::Match& match, const PointCluster& cluster, const Iterate& at, Association& out) const;
   void add_row(std::size_t i, const SE3& T_WI, Sums& sums);
 
@@ -87,7 +89,8 @@ class LidarModel {
   const Workers& workers_;
   std::vector<Place> places_;
   std::vector<Association> associations_;
-  std::vector<std::uint16_t> rows_of_node_;
+  std::vector<std::uint32_t> plane_of_node_;  // place in rows_of_plane_; of nodes that have one while rows are counted
+  std::vector<std::uint16_t> rows_of_plane_;  // of the last evaluation
   bool first_ = true, keeps_weak_ = false;
   RegistrationReport report_;
 };

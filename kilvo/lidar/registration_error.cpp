@@ -27,51 +27,43 @@ double pull_of_noise(const Eigen::Vector3d& n, const Eigen::Vector3d& beam, doub
 
 PoseCovariance LidarModel::systematic() const {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
-  struct OfPlane {
-    Vector6 pull = Vector6::Zero();  // of its own error on b
-    OuterSum bumps;
-    int rows = 0;
-  };
-  std::vector<std::uint32_t> index_of_node(map_.node_capacity(), VoxelIndex::none);
-  std::vector<OfPlane> planes;
-  planes.reserve(associations_.size() / 2);
+  std::vector<Vector6> pull_of_plane(rows_of_plane_.size(), Vector6::Zero());  // of its own error on b
+  std::vector<OuterRow> rows;                                                  // of bumps, then of the planes' pulls
+  rows.reserve(associations_.size());
   Vector6 pull = Vector6::Zero();
   for (std::size_t i = 0; i < associations_.size(); ++i) {
     const Association& a = associations_[i];
     if (a.plane == nullptr) continue;
-    std::uint32_t& index = index_of_node[a.node];
-    if (index == VoxelIndex::none) {
-      index = static_cast<std::uint32_t>(planes.size());
-      planes.emplace_back();
-    }
-    OfPlane& plane = planes[index];
-    ++plane.rows;
-    plane.pull += a.weight * std::sqrt(a.plane_variance) * a.row.J;
-    const OuterRow bump(a.row.J, a.weight * a.weight * static_cast<double>(a.plane->roughness_variance));
-    plane.bumps.add(&bump, 1);
+    pull_of_plane[a.shared] += a.weight * std::sqrt(a.plane_variance) * a.row.J;
+    const double alike = std::max(1.0, rows_of_plane_[a.shared] / bumps_of_a_plane);
+    rows.emplace_back(a.row.J, alike * a.weight * a.weight * static_cast<double>(a.plane->roughness_variance));
     // A point that is alone in its cell weighs as it does itself.
     const double count = clusters_[i].count, together = 1 - 1 / count;
     pull += a.weight * together * pull_of_noise(a.n_I, clusters_[i].mean.cast<double>() - p_IL_, a.variance * count, config_) * a.row.J;
   }
-  PoseCovariance M = pull * pull.transpose();
-  for (const OfPlane& plane : planes)
-    M += plane.pull * plane.pull.transpose() + std::max(1.0, plane.rows / bumps_of_a_plane) * plane.bumps.lower();
+  OuterSum M;
+  M.add(rows.data(), rows.size());
+  rows.clear();
+  for (const Vector6& of_plane : pull_of_plane) rows.emplace_back(of_plane, 1);
+  rows.emplace_back(pull, 1);
+  M.add(rows.data(), rows.size());
   const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
-  return known.transpose() * M.selfadjointView<Eigen::Lower>() * known;
+  return known.transpose() * M.lower().selfadjointView<Eigen::Lower>() * known;
 }
 
 std::vector<EpochInformation> LidarModel::by_epoch() const {
-  std::vector<std::pair<std::uint32_t, OuterSum>> sums;
+  std::vector<std::pair<std::uint32_t, std::vector<OuterRow>>> rows;
   for (const Association& a : associations_) {
     if (a.plane == nullptr) continue;
-    auto it = std::ranges::find_if(sums, [&a](const auto& sum) { return sum.first == a.epoch; });
-    if (it == sums.end()) it = sums.insert(it, {a.epoch, OuterSum()});
-    const OuterRow row(a.row.J, a.weight);
-    it->second.add(&row, 1);
+    auto it = std::ranges::find_if(rows, [&a](const auto& of_epoch) { return of_epoch.first == a.epoch; });
+    if (it == rows.end()) it = rows.insert(it, {a.epoch, {}});
+    it->second.emplace_back(a.row.J, a.weight);
   }
   std::vector<EpochInformation> out;
   const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
-  for (const auto& [epoch, sum] : sums) {
+  for (const auto& [epoch, of_epoch] : rows) {
+    OuterSum sum;
+    sum.add(of_epoch.data(), of_epoch.size());
     const PoseCovariance A = sum.lower().selfadjointView<Eigen::Lower>();
     out.push_back({epoch, known.transpose() * A * known});
   }

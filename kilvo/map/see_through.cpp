@@ -17,13 +17,13 @@ constexpr std::uint32_t few = 6, long_ago = 50;
 // A plane that beams of so many sweeps passed through since points were found on it is gone.
 constexpr std::uint8_t gone = 5;
 
-// How far along the beam it is from x until it leaves the cube of this size that x is in.
-double way_out(const Eigen::Vector3d& x, const Eigen::Vector3d& direction, double size) {
+// How far along the beam it is from x until it leaves the cube of this size that is the one `at` of its grid and holds x.
+double way_out(const Eigen::Vector3d& x, const Eigen::Vector3d& inverse_direction, const std::array<std::int64_t, 3>& at, double size) {
   double way = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 3; ++i) {
-    const double low = size * std::floor(x[i] / size);
-    if (direction[i] > 0) way = std::min(way, (low + size - x[i]) / direction[i]);
-    if (direction[i] < 0) way = std::min(way, (low - x[i]) / direction[i]);
+    const double low = size * static_cast<double>(at[static_cast<std::size_t>(i)]), into = inverse_direction[i];
+    const double face = into > 0 ? low + size : low;
+    if (std::abs(into) < std::numeric_limits<double>::infinity()) way = std::min(way, std::max(0.0, (face - x[i]) * into));
   }
   return way;
 }
@@ -68,7 +68,7 @@ std::size_t VoxelMap::direction_cell(const Eigen::Vector3d& way) {
 void VoxelMap::trace(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const double length = (to - from).norm(), clear = leaf_size();
   if (!(length < config_.radius) || length < 2 * clear) return;
-  const Eigen::Vector3d direction = (to - from) / length;
+  const Eigen::Vector3d direction = (to - from) / length, inverse_direction = direction.cwiseInverse();
   constexpr double beyond = 1e-6;  // m: on the other side of a face
   std::uint32_t last = none;
   for (double way = clear; way < length - clear;) {
@@ -77,7 +77,7 @@ void VoxelMap::trace(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     const std::uint32_t root = roots_.find(root_key(leaf));
     const bool empty = root == none || (nodes_[root].is_plane && !passes(nodes_[root].plane, from, to, clear));
     if (!empty && is_passed(root, leaf, from, to, last)) return;
-    way += way_out(x, direction, empty ? config_.voxel_size : clear) + beyond;
+    way += beyond + (empty ? way_out(x, inverse_direction, root_of(leaf), config_.voxel_size) : way_out(x, inverse_direction, leaf, clear));
   }
 }
 
