@@ -289,6 +289,7 @@ int run_recording(const RunOptions& options) {
       if (!options.quiet) fmt::print(stderr, "kilvo: the run begins anew{}\n", consequence(known, choice.used, facts.sensors));
     }
     fit_to_machine(settings, options.realtime.has_value(), options.threads);
+    settings.estimator.sweep_points = options.with_map || options.mcap;
     auto run = std::make_unique<Run>(options, interrupt, settings, choice.used, facts, known);
     if (const std::optional<int> code = run->all()) return *code;
     const std::vector<lab::WrongDescription> found = run->wrong();

@@ -46,6 +46,7 @@ struct EstimatorConfig {
   bool gravity_align = true;
   std::string settling = "legs";  // legs | all | none
   int threads = 1;
+  bool sweep_points = true;  // outputs of sweeps carry their points; no setting: the program knows whether anything reads them
 
   InitialConfig initial;
   ProcessNoise noise;

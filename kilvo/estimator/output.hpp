@@ -47,7 +47,7 @@ struct Output {
   std::vector<Indicator> indicators;  // of a sweep, of an image
   std::vector<Event> events;          // that became true since the output before
   // Only of sweeps:
-  std::vector<PointXYZI> points_W;  // undistorted, in the world
+  std::vector<PointXYZI> points_W;  // undistorted, in the world; empty unless EstimatorConfig::sweep_points or a camera wants them
   RegistrationReport registration;
   // Only of images:
   std::vector<ColouredPoint> coloured;  // points of the map that it sees, exposure-corrected

@@ -93,7 +93,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   frames_.scan_used(middle);
   result.registration = sweep.report;
   result.indicators = indicators_of(sweep.points, sweep.report);
-  result.points_W = in_world(sweep.points, T_WI);
+  if (vision_ || config_.sweep_points) result.points_W = in_world(sweep.points, T_WI);
   if (vision_) vision_->see(result.points_W);
   result.stages.other_us = watch.lap_us();
   outputs_.add_sweep(std::move(result));

@@ -13,8 +13,15 @@ void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservab
   if (is_given_ || !may_grow) return;
   const std::uint32_t epoch = error_.epoch_now(T_WI, sweep.posterior.P.topLeftCorner<6, 6>());
   lidar_.range_noise = sweep.range_noise;
-  const std::vector<PointGroup> seen = to_world(sweep.clusters, T_WI, p_IL_, lidar_);
-  surfaces_.insert(seen, epoch);
+  // A few at a time: what is made of them is used while it is in the cache.
+  constexpr std::size_t at_once = 32;
+  std::vector<Eigen::Vector3d> seen;
+  seen.reserve(sweep.clusters.size());
+  for (std::span<const PointCluster> rest = sweep.clusters; !rest.empty(); rest = rest.subspan(std::min(at_once, rest.size()))) {
+    const std::vector<PointGroup> groups = to_world(rest.first(std::min(at_once, rest.size())), T_WI, p_IL_, lidar_);
+    surfaces_.insert(groups, epoch);
+    for (const PointGroup& g : groups) seen.push_back(g.mean);
+  }
   surfaces_.see_through(T_WI * p_IL_, seen);
   surfaces_.forget(sweep.posterior.x.p);
 }

@@ -19,7 +19,7 @@ using Long4 = std::int64_t __attribute__((vector_size(32)));
 
 // Sums around the first point of the cell, so that floats lose nothing. One line of the cache.
 struct alignas(64) Cell {
-  Float4 first_point{};    // x y z and nothing
+  Float4 first_point{};    // x y z and anything
   Float4 sum_and_count{};  // x y z and how many
   Float4 outer_a{};        // xx xy xz yy
   Float4 outer_b{};        // yz zz and nothing of use
@@ -50,14 +50,14 @@ class CellTable {
     keys_.reserve(points / 4);
   }
 
-  // The index of the cell; a new one begins at p (x y z and 0).
-  std::uint32_t index_of(VoxelKey key, const Float4& p) {
+  // Where the cell is; a new one begins at p (x y z and anything).
+  [[gnu::always_inline]] inline Cell& at(VoxelKey key, const Float4& p) {
     for (std::size_t i = home(key);; i = (i + 1) & mask_) {
       const std::uint32_t slot = slots_[i];
       if (slot == empty) [[unlikely]]
         return begin_cell(i, key, p);
       if (keys_[slot] == key) [[likely]]
-        return slot;
+        return cells_[slot];
     }
   }
 
@@ -78,13 +78,13 @@ class CellTable {
  private:
   static constexpr std::uint32_t empty = VoxelIndex::none;
   std::size_t home(VoxelKey key) const { return (key * 0x9E3779B97F4A7C15ULL) >> 32 & mask_; }
-  std::uint32_t begin_cell(std::size_t slot, VoxelKey key, const Float4& p) {
-    const auto index = static_cast<std::uint32_t>(cells_.size());
-    slots_[slot] = index;
+  // By value: an address would keep the point in memory for all the others.
+  [[gnu::noinline]] Cell& begin_cell(std::size_t slot, VoxelKey key, Float4 p) {
+    slots_[slot] = static_cast<std::uint32_t>(cells_.size());
     cells_.emplace_back().first_point = p;
     keys_.push_back(key);
     if (2 * cells_.size() > slots_.size()) grow();
-    return index;
+    return cells_.back();
   }
   void grow() {
     slots_.assign(2 * slots_.size(), empty);
@@ -162,8 +162,8 @@ void join(const Cell& from, Cell& to) {
 }
 
 [[gnu::always_inline]] inline void add(const Float4& p, Cell& c) {
-  Float4 d = p - c.first_point;
-  d[3] = 1;
+  constexpr Int4 point = {-1, -1, -1, 0}, one = {0, 0, 0, std::bit_cast<int>(1.0F)};
+  const Float4 d = std::bit_cast<Float4>((std::bit_cast<Int4>(p - c.first_point) & point) | one);
   c.sum_and_count += d;
   c.outer_a += Float4{d[0], d[0], d[0], d[1]} * Float4{d[0], d[1], d[2], d[1]};
   c.outer_b += Float4{d[1], d[2], d[1], d[2]} * Float4{d[2], d[2], d[2], d[2]};
@@ -203,6 +203,15 @@ KILVO_WIDE void keys_of(const float* points, std::size_t count, const Grid& grid
   }
 }
 
+// The points of a block into their cells.
+KILVO_WIDE void add_all(const float* points, const VoxelKey* keys, std::size_t count, CellTable& table) {
+  for (std::size_t i = 0; i < count; ++i) {
+    Float4 p;
+    std::memcpy(&p, points + 4 * i, sizeof(p));
+    add(p, table.at(keys[i], p));
+  }
+}
+
 // All points into their cells.
 void gather(std::span<const PointXYZI> points, const Grid& grid, CellTable& table) {
   std::array<VoxelKey, block> keys;
@@ -215,13 +224,7 @@ void gather(std::span<const PointXYZI> points, const Grid& grid, CellTable& tabl
       std::memcpy(last.data(), at + 4 * whole, (count - whole) * sizeof(Float4));
       keys_of(reinterpret_cast<const float*>(last.data()), 4, grid, keys.data() + whole);
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      Float4 p;
-      std::memcpy(&p, at + 4 * i, sizeof(p));
-      p[3] = 0;
-      const std::uint32_t index = table.index_of(keys[i], p);
-      add(p, table.cells()[index]);
-    }
+    add_all(at, keys.data(), count, table);
   }
 }
 

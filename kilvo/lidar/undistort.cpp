@@ -9,6 +9,8 @@ namespace kilvo {
 namespace {
 
 using Float4 = float __attribute__((vector_size(16)));
+using Int4 = int __attribute__((vector_size(16)));
+using Long2 = std::int64_t __attribute__((vector_size(16)));
 using Float8 = float __attribute__((vector_size(32)));
 
 // The columns of two poses that follow each other, side by side: the processor moves a point by both at once.
@@ -58,25 +60,90 @@ void count_drop(const LidarPoint& p, const Limits& limits, PointDrops& drops) {
   }
 }
 
+// A time within a step of the grid, from its beginning on.
+struct Step {
+  std::int64_t begin = 0, end = 0;  // ns, in offsets of the scan
+  const Pair* pair = nullptr;
+};
+
+Step step_of(std::int64_t offset_ns, const Pair* pairs, const Limits& limits) {
+  const std::int64_t i = (limits.base + offset_ns) / step_ns, begin = i * step_ns - limits.base;
+  return {begin, std::min(begin + step_ns, limits.span - limits.base + 1), pairs + i};
+}
+
+constexpr float inverse_step = 1.0f / static_cast<float>(step_ns);
+
+[[gnu::always_inline]] inline Float4 moved(const LidarPoint& p, const Step& step) {
+  const float s = static_cast<float>(p.offset_ns - step.begin) * inverse_step;
+  const Pair& pair = *step.pair;
+  const Float8 both = pair.column[0] * p.x + pair.column[1] * p.y + pair.column[2] * p.z + pair.column[3];
+  const Float4 a{both[0], both[1], both[2], both[3]}, b{both[4], both[5], both[6], both[7]};
+  Float4 x = a + s * (b - a);
+  x[3] = p.intensity - p.intensity == 0 ? p.intensity : 0;  // a place is good without it
+  return x;
+}
+
+[[gnu::always_inline]] inline void transpose(Float4* rows) {
+  const Float4 a = __builtin_shuffle(rows[0], rows[1], Int4{0, 4, 1, 5}), b = __builtin_shuffle(rows[0], rows[1], Int4{2, 6, 3, 7});
+  const Float4 c = __builtin_shuffle(rows[2], rows[3], Int4{0, 4, 1, 5}), d = __builtin_shuffle(rows[2], rows[3], Int4{2, 6, 3, 7});
+  rows[0] = __builtin_shuffle(a, c, Int4{0, 1, 4, 5}), rows[1] = __builtin_shuffle(a, c, Int4{2, 3, 6, 7});
+  rows[2] = __builtin_shuffle(b, d, Int4{0, 1, 4, 5}), rows[3] = __builtin_shuffle(b, d, Int4{2, 3, 6, 7});
+}
+
+[[gnu::always_inline]] inline bool all(const Int4& lanes) {
+  Long2 halves;
+  std::memcpy(&halves, &lanes, sizeof(halves));
+  return (halves[0] & halves[1]) == -1;
+}
+
+// Four points of one step at once, with the same operations as one by one. False, and nothing done, where one of them is not of the step
+// or cannot be used.
+[[gnu::always_inline]] inline bool move_four(const LidarPoint* p, const Step& step, const Limits& limits, PointXYZI* out) {
+  const Int4 offsets = {p[0].offset_ns, p[1].offset_ns, p[2].offset_ns, p[3].offset_ns};
+  const Int4 since = offsets - static_cast<int>(step.begin);
+  Float4 x[4];
+  for (int k = 0; k < 4; ++k) std::memcpy(&x[k], &p[k].x, sizeof(x[k]));
+  transpose(x);
+  const Float4 range2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
+  const Int4 usable =
+      (range2 >= limits.nearest2) & (range2 <= limits.farthest2) & (since >= 0) & (since < static_cast<int>(step.end - step.begin));
+  if (!all(usable)) return false;
+  const Float4 s = __builtin_convertvector(since, Float4) * inverse_step;
+  const Pair& pair = *step.pair;
+  Float4 y[4];
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto of = [&](std::size_t row) __attribute__((always_inline)) {
+      return pair.column[0][row] * x[0] + pair.column[1][row] * x[1] + pair.column[2][row] * x[2] + pair.column[3][row];
+    };
+    const Float4 a = of(k), b = of(4 + k);
+    y[k] = a + s * (b - a);
+  }
+  y[3] = x[3] - x[3] == 0 ? x[3] : Float4{};
+  transpose(y);
+  std::memcpy(out->data(), y, sizeof(y));
+  return true;
+}
+
 // Writes the points that can be used; how many.
 KILVO_WIDE std::size_t move_points(std::span<const LidarPoint> points, const Pair* pairs, const Limits& limits, PointDrops& drops,
                                    PointXYZI* out) {
-  constexpr float inverse_step = 1.0f / static_cast<float>(step_ns);
-  std::size_t used = 0;
-  for (const LidarPoint& p : points) {
+  Step step;
+  std::size_t used = 0, i = 0;
+  while (i < points.size()) {
+    if (i + 4 <= points.size() && move_four(&points[i], step, limits, out + used)) [[likely]] {
+      i += 4;
+      used += 4;
+      continue;
+    }
+    const LidarPoint& p = points[i++];
     const float range2 = p.x * p.x + p.y * p.y + p.z * p.z;
     const std::int64_t offset = limits.base + p.offset_ns;
     if (!(range2 >= limits.nearest2 && range2 <= limits.farthest2) || offset < 0 || offset > limits.span) [[unlikely]] {
       count_drop(p, limits, drops);
       continue;
     }
-    const std::int64_t i = offset / step_ns;
-    const float s = static_cast<float>(offset - i * step_ns) * inverse_step;
-    const Pair& pair = pairs[i];
-    const Float8 both = pair.column[0] * p.x + pair.column[1] * p.y + pair.column[2] * p.z + pair.column[3];
-    const Float4 a{both[0], both[1], both[2], both[3]}, b{both[4], both[5], both[6], both[7]};
-    Float4 x = a + s * (b - a);
-    x[3] = p.intensity - p.intensity == 0 ? p.intensity : 0;  // a place is good without it
+    step = step_of(p.offset_ns, pairs, limits);
+    const Float4 x = moved(p, step);
     std::memcpy(out[used++].data(), &x, sizeof(x));
   }
   return used;

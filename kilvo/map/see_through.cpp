@@ -36,21 +36,21 @@ bool passes(const Plane& plane, const Eigen::Vector3d& from, const Eigen::Vector
 
 }  // namespace
 
-void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const PointGroup> groups) {
+void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const Eigen::Vector3d> ends) {
   ++sweep_;
-  if (groups.empty()) return;
-  const std::size_t count = groups.size(), stride = std::max<std::size_t>(1, count / most_beams);
+  if (ends.empty()) return;
+  const std::size_t count = ends.size(), stride = std::max<std::size_t>(1, count / most_beams);
   const std::size_t first = 7919 * static_cast<std::size_t>(sweep_) % count;  // anywhere: where the way does not do, each has its turn
   double left = most_way;
   const auto follow = [&](const Eigen::Vector3d& to) {
     trace(origin_W, to);
     left -= (to - origin_W).norm();
   };
-  for (std::size_t i = 0; i < count && left > 2 * most_way / 3; i += stride) follow(groups[(first + i) % count].mean);
+  for (std::size_t i = 0; i < count && left > 2 * most_way / 3; i += stride) follow(ends[(first + i) % count]);
   if (sweep_ - passed_last_ >= few) return;
   std::size_t more = 0;
   for (std::size_t i = 0; i < count && left > 0 && more < most_more; ++i) {
-    const Eigen::Vector3d& to = groups[(first + i) % count].mean;
+    const Eigen::Vector3d& to = ends[(first + i) % count];
     if (sweep_ - passed_in_[direction_cell(to - origin_W)] >= few) continue;
     follow(to);
     ++more;

@@ -61,9 +61,9 @@ class VoxelMap {
   /// begin now are marked with `epoch`: the caller's name for the pose error that they share.
   void insert(std::span<const PointGroup> groups, std::uint32_t epoch);
 
-  /// The beams from `origin_W` to the means of `groups` (of some of them, others each time) met nothing on their way: a plane that beams
+  /// The beams from `origin_W` to these `ends` (to some of them, others each time) met nothing on their way: a plane that beams
   /// keep passing through, and that no group is found on meanwhile, is not there any more and is forgotten with its points.
-  void see_through(const Eigen::Vector3d& origin_W, std::span<const PointGroup> groups);
+  void see_through(const Eigen::Vector3d& origin_W, std::span<const Eigen::Vector3d> ends);
 
   /// Forgets voxels beyond the radius around `centre`, and the farthest ones while there are more than max_nodes.
   void forget(const Eigen::Vector3d& centre);

@@ -232,7 +232,7 @@ struct SeenThrough {
   void sweep(const std::vector<Eigen::Vector3d>& points) {
     const std::vector<PointGroup> groups = test::groups_of(points, leaf, sigma);
     map.insert(groups, 1);
-    map.see_through(Eigen::Vector3d::Zero(), groups);
+    map.see_through(Eigen::Vector3d::Zero(), test::means_of(groups));
   }
   // What a beam meets first.
   static std::vector<Eigen::Vector3d> scene(bool with_box) {
@@ -286,7 +286,7 @@ TEST(VoxelMap, AFloorUnderGrazingBeamsStays) {
   const auto groups = test::groups_of(test::points_on({-5, -5, -1}, 10 * x_axis, 10 * y_axis, 0.1), leaf, sigma);
   for (int i = 0; i < 50; ++i) {
     map.insert(groups, 1);
-    map.see_through({0, 0, 0}, groups);
+    map.see_through({0, 0, 0}, test::means_of(groups));
   }
   for (double x = -4.9; x < 5; x += 0.5) EXPECT_NE(map.plane_at({x, 0.5 * x, -1}), nullptr) << x;
 }

@@ -28,6 +28,12 @@ inline std::vector<PointGroup> groups_of(const std::vector<Eigen::Vector3d>& poi
   return groups;
 }
 
+inline std::vector<Eigen::Vector3d> means_of(const std::vector<PointGroup>& groups) {
+  std::vector<Eigen::Vector3d> means;
+  for (const PointGroup& g : groups) means.push_back(g.mean);
+  return means;
+}
+
 /// A grid of points on corner + a u + b v, a and b in [0, 1], about `spacing` apart and none on the rim.
 inline std::vector<Eigen::Vector3d> points_on(const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& v,
                                               double spacing) {
