@@ -8,9 +8,6 @@
 namespace kilvo {
 namespace {
 
-// More of scans and images is not worth waiting for the IMU.
-constexpr Duration longest_wait = std::chrono::seconds(2);
-
 bool is_scan(const FrameQueue::Frame& f) { return std::holds_alternative<LidarScan>(f.what); }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "kilvo/filter/stationarity.hpp"
+
 namespace kilvo {
 namespace {
 
@@ -86,7 +88,6 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   const auto gyro = statistics_of(window_, &ImuSample::gyro);
   const auto accel = statistics_of(window_, &ImuSample::accel);
   const double unit = unit_of(accel.mean.norm());
-  constexpr double usual_gyro_bias = 0.03, largest_gyro_bias = 0.1;  // rad/s; a larger mean is motion
   // A slow sway has a small deviation and is no rest: its rate would be taken for the bias. It shows as a change within the window.
   constexpr double largest_change = 0.004;  // rad/s
   const auto middle = window_.begin() + static_cast<std::ptrdiff_t>(window_.size() / 2);
@@ -97,7 +98,7 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   const Eigen::Vector3d turned = statistics_of(newer, &ImuSample::accel).mean - statistics_of(older, &ImuSample::accel).mean;
   const double noise = accel.sigma.norm() * std::sqrt(4.0 / static_cast<double>(window_.size()));
   const bool gravity_stays = by_motion.norm() < 3 * noise || turned.dot(by_motion) < 0.5 * by_motion.squaredNorm();
-  const bool is_bias = gyro.mean.norm() < usual_gyro_bias || (gyro.mean.norm() < largest_gyro_bias && gravity_stays);
+  const bool is_bias = gyro.mean.norm() < largest_resting_rate || (gyro.mean.norm() < largest_gyro_bias && gravity_stays);
   const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && is_bias && change.cwiseAbs().maxCoeff() < largest_change &&
                      accel.sigma.maxCoeff() * unit < config_.still_accel &&
                      largest_change_of_velocity(window_, accel.mean) * unit < config_.velocity_sigma;

@@ -11,6 +11,9 @@
 
 namespace kilvo {
 
+/// A larger mean rate, or a bias that has changed by more, is of no gyro, rad/s.
+inline constexpr double largest_gyro_bias = 0.1;
+
 struct Start {
   Estimate estimate;               // at the first sample of the still window, or at the last sample of a moving start
   std::optional<Time> rest_until;  // the last sample of the still window

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kilvo/input/timeline.hpp"
+#include "kilvo/sensors/silence.hpp"
 
 namespace kilvo {
 namespace {
@@ -12,14 +13,12 @@ namespace {
 constexpr int few_witnesses = 3;
 // Beyond, the robot need not be where it was: nothing is remembered for so long.
 constexpr Duration longest_step = std::chrono::seconds(2);
-// Samples that follow each other are no farther apart.
-constexpr Duration longest_interval = std::chrono::milliseconds(100);
 // Legs that come as often are a clock.
 constexpr Duration often = std::chrono::milliseconds(5);
 // The years 1933 to 2116; and steps of 36 years in all. Beyond, differences of times are no times any more.
 constexpr Duration era = Duration(std::int64_t{1} << 60);
 
-bool are_neighbours(Time a, Time b) { return b > a && b - a < longest_interval; }
+bool are_neighbours(Time a, Time b) { return b > a && to_seconds(b - a) < blind_gap; }
 
 // Of two durations that may be too far apart for a Duration, s.
 double distance(Duration a, Duration b) { return std::abs(to_seconds(a) - to_seconds(b)); }
@@ -39,7 +38,7 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
   went_on_ = is_gap && suspect_ && are_neighbours(*suspect_, now);
   suspect_ = is_gap ? std::optional(now) : std::nullopt;
   if (is_gap && !went_on_ && !alone_ahead) return Reason::time_jump;
-  if (since > -ClockModel::stamp_jitter && since < longest_interval && !alone_ahead) {
+  if (since > -ClockModel::stamp_jitter && to_seconds(since) < blind_gap && !alone_ahead) {
     if (is_gap) note_hole(now);
     if (since > Duration(0)) imu.note(now);
     legs_then_ = legs().newest;
@@ -87,7 +86,7 @@ void ClockSteps::Run::add(Time t) {
 // The others must have shown whether they went back as well; when there are none, nothing is waited for.
 bool ClockSteps::is_sure() const {
   const bool alone = std::ranges::none_of(clocks_, [](const Clock& clock) { return clock.usual_lag.has_value(); });
-  return alone || run_.with + run_.without > 0 || run_.newest - run_.first > patience;
+  return alone || run_.with + run_.without > 0 || run_.newest - run_.first > clock_jump;
 }
 
 // What was missing comes late: a time that had gone back would repeat stamps that were there.
@@ -119,10 +118,10 @@ void ClockSteps::follow_other(Clock& clock, Time t) {
   const Time newest = *imu().newest;
   const Duration stays = newest - (t + clock.offset), steps = newest - (t + imu().offset);
   const Duration usual = clock.usual_lag.value_or(steps);
-  if (newest < clock.may_step_until) clock.may_step_until = std::min(clock.may_step_until, newest + patience);
+  if (newest < clock.may_step_until) clock.may_step_until = std::min(clock.may_step_until, newest + clock_jump);
   if (newest < clock.may_step_until && distance(steps, usual) < distance(stays, usual)) clock.offset = imu().offset;
   const Duration lag = newest - (t + clock.offset);
-  constexpr double most = 0.05;  // s; one message that is late by hours is not to be followed
+  const double most = to_seconds(least_silence);  // one message that is late by hours is not to be followed
   clock.usual_lag = usual + from_seconds(std::clamp(to_seconds(lag) - to_seconds(usual), -most, most) / 10);
   clock.note_lag(lag, longest_step);
 }

@@ -17,12 +17,12 @@ std::optional<Reason> fault_of(const ImuSample& s) {
 }
 
 std::optional<Reason> fault_of(const JointSample& s) {
-  constexpr double absurd_position = 100, absurd_velocity = 100;  // rad or m, rad/s or m/s: no joint turns so fast
-  const auto beyond = [](const std::vector<double>& values, double limit) {
-    return std::ranges::any_of(values, [limit](double v) { return std::isfinite(v) && std::abs(v) > limit; });
+  constexpr double absurd = 100;  // rad or m, rad/s or m/s: no joint goes so far, or so fast
+  const auto beyond = [](const std::vector<double>& values) {
+    return std::ranges::any_of(values, [](double v) { return std::isfinite(v) && std::abs(v) > absurd; });
   };
   if (s.position.empty()) return Reason::empty;
-  return when(beyond(s.position, absurd_position) || beyond(s.velocity, absurd_velocity), Reason::absurd_value);
+  return when(beyond(s.position) || beyond(s.velocity), Reason::absurd_value);
 }
 
 std::optional<Reason> fault_of(const Measurement& m) {

@@ -49,7 +49,7 @@ void InputQueue::admit(Measurement m, std::optional<Reason> off_clock) {
 }
 
 double InputQueue::shift_by(Sensor s, double by) {
-  constexpr double longest = 0.2;  // s
+  const double longest = to_seconds(max_wait_);  // later ones could not wait for those of their time
   Duration& shift = shift_[index_of(s)];
   const double total = std::clamp(to_seconds(shift) + by, -longest, longest);
   shift = from_seconds(total);

@@ -7,9 +7,7 @@
 namespace kilvo {
 namespace {
 
-// Of one sensor no more waits than this: bytes, and time between the oldest and the newest.
-constexpr std::size_t most_bytes = std::size_t{64} << 20;
-constexpr Duration longest_wait = std::chrono::seconds(3);
+constexpr std::size_t most_bytes = std::size_t{64} << 20;  // of one sensor
 
 std::size_t bytes_of(const Measurement& m) {
   if (const auto* scan = std::get_if<LidarScan>(&m)) return scan->points.size() * sizeof(LidarPoint);

@@ -9,6 +9,9 @@
 
 namespace kilvo {
 
+/// Between the oldest and the newest of a sensor that wait for the IMU; nothing older is propagated again.
+inline constexpr Duration longest_wait = std::chrono::seconds(2);
+
 /// When a measurement is complete: a scan at its last point, anything else at its stamp.
 Time completion_of(const Measurement& m);
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "kilvo/sensors/silence.hpp"
+
 namespace kilvo {
 
 void Timeline::give_up_suspects() {
@@ -53,16 +55,14 @@ std::optional<Reason> Timeline::admit(Measurement m, Time key) {
 
 // Something may come of this sensor that must go before.
 bool Timeline::is_awaited(Sensor sensor, Time key) const {
-  // A sensor that comes often is missed when it has been silent for so long.
-  constexpr Duration silence = std::chrono::milliseconds(50);
   if (sensor == Sensor::camera && !wait_for_images_) return false;
   const bool is_frame = sensor == Sensor::lidar || sensor == Sensor::camera;
   const ClockModel& clock = clocks_[index_of(sensor)];
   if (const auto& imu = newest(Sensor::imu); imu && sensor != Sensor::imu) {
     // Who has been silent for long, or was never there, is not waited for.
     const Duration lag = std::max(Duration(0), clock.lag.value_or(Duration(0)));
-    const Duration longest = is_frame ? std::max(max_wait_, 3 * clock.spacing) : std::max(silence, 5 * clock.spacing) + lag;
-    if (clock.newest ? *imu - *clock.newest > longest : !is_frame && *imu - *first_imu_ > patience) return false;
+    const Duration longest = is_frame ? std::max(max_wait_, 3 * clock.spacing) : std::max(least_silence, 5 * clock.spacing) + lag;
+    if (clock.newest ? *imu - *clock.newest > longest : !is_frame && *imu - *first_imu_ > clock_jump) return false;
   }
   // A frame that comes so much sooner than the one before is fused late, no more.
   return !clock.newest || *clock.newest + (is_frame ? 7 * clock.spacing / 10 : Duration(0)) < key;

@@ -16,11 +16,10 @@
 
 namespace kilvo {
 
-/// Stamps farther apart than this are of a clock that has jumped; so many in a row that agree with each other show that time really has.
+/// Stamps farther apart than this have nothing to do with each other: a clock has jumped, or nobody is there. So many in a row that agree
+/// with each other show that time really has jumped.
 inline constexpr Duration clock_jump = std::chrono::seconds(1);
 inline constexpr int clock_witnesses = 10;
-/// For so long a sensor may be silent: after that nobody waits for it, or for what it would say of a step of another clock.
-inline constexpr Duration patience = std::chrono::seconds(1);
 
 /// A message that is not let through.
 struct Refusal {
