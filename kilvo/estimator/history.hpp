@@ -34,14 +34,12 @@ class History {
 
   /// The estimate of a time not before the base. What was passed on the way is in the trajectory.
   Estimate at(Time t) { return record_from(base_, t); }
-  /// For a sweep around `middle` until `end`: the same, but that what the accelerometer reported since the base is wrong; or, if the sweep
-  /// is `off` by so much (m), that the velocity of the base is less certain. None when it was too long ago, or that is too much. Its now()
-  /// and closed() are what they are here.
+  /// For a sweep around `middle` until `end`: a history that does not trust the accelerometer since the base; or, if the sweep is `off` by
+  /// so much (m), one whose base has a less certain velocity. None when it is too long ago, or too much. now() and closed() stay.
   std::optional<History> doubted(Time middle, Time end, std::optional<double> off) const;
   /// The estimate at `until` if it was `e` before. The poses on the way are in the trajectory.
   Estimate record_from(const Estimate& e, Time until);
-  /// How the IMU moved from `t` to the base: its poses at both, as the trajectory has them; the same when `t` is not before the base. None
-  /// when it is too long before.
+  /// Poses of the trajectory at `t` and at the base; the same twice when `t` is not before the base, none when it is too long before.
   struct Motion {
     SE3 begin, end;
   };

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <iterator>
 
-#include "kilvo/input/fault.hpp"
-
 namespace kilvo {
 
 InputQueue::InputQueue(const Robot& robot, std::array<bool, sensor_count> used, Duration max_wait, bool wait_for_images)
