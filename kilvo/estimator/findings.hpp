@@ -1,5 +1,4 @@
-// What the estimator reports beside its states: counts of messages, events as they become true, and whether what the sensors say can be
-// true together. What cannot is reported with the two that contradict each other.
+// What the estimator reports beside its states: counts of messages, events, and contradictions between two sensors.
 #pragma once
 
 #include <array>

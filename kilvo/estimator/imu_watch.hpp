@@ -1,4 +1,4 @@
-// Checks of the IMU's samples before they are integrated: unit, plausibility, clipping; and whether the robot stands still.
+// Checks of the IMU's samples before they are integrated: unit, plausibility, clipping, standstill.
 #pragma once
 
 #include <optional>

@@ -25,7 +25,8 @@ struct ClockModel {
   /// One message that is late by more than `most` counts as late by that.
   void note_lag(Duration behind, Duration most) {
     behind = std::min(behind, most);
-    lag = lag && behind < *lag ? *lag + (behind - *lag) / 4096 : behind;
+    // Forgets by 2 ms in a second, or in some seconds: an IMU that comes late for a moment makes the others trail it by less.
+    lag = lag ? std::max(behind, *lag - std::max(spacing / 512, *lag / 4096)) : behind;
   }
 
   /// More time than between two messages, whatever their jitter: some are missing, or the stamp is wrong.

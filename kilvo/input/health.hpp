@@ -1,4 +1,4 @@
-// Plausibility of the sensors' messages as they arrive: values that no sensor measures, repeated values, clipped values, rate, jitter, clocks.
+// Plausibility of the sensors' messages as they arrive: absurd, repeated and clipped values, rate, jitter, clocks.
 #pragma once
 
 #include <array>

@@ -7,7 +7,9 @@
 namespace kilvo {
 namespace {
 
-constexpr std::size_t most_bytes = std::size_t{64} << 20;  // of one sensor
+// Of one sensor no more waits than this: bytes, and time between the oldest and the newest.
+constexpr std::size_t most_bytes = std::size_t{64} << 20;
+constexpr Duration most_time = std::chrono::seconds(3);
 
 std::size_t bytes_of(const Measurement& m) {
   if (const auto* scan = std::get_if<LidarScan>(&m)) return scan->points.size() * sizeof(LidarPoint);
@@ -56,11 +58,11 @@ int ReorderBuffer::bound(Sensor s, Time newest) {
   std::size_t& bytes = bytes_[index_of(s)];
   int given_up = 0;
   // Nothing that waits is older than what waits at the front.
-  while (bytes > most_bytes || newest - first() > longest_wait) {
+  while (bytes > most_bytes || newest - first() > most_time) {
     const auto rank = [s](const Entry& e) { return std::tuple(e.measurement.index() != index_of(s), e.completion, e.arrival); };
     const auto oldest = std::ranges::min_element(heap_, {}, rank);
     const std::size_t size = bytes_of(oldest->measurement);
-    if (bytes == size || (bytes <= most_bytes && newest - oldest->completion <= longest_wait)) break;
+    if (bytes == size || (bytes <= most_bytes && newest - oldest->completion <= most_time)) break;
     bytes -= size;
     heap_.erase(oldest);
     std::ranges::make_heap(heap_, is_later);

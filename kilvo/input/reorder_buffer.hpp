@@ -9,12 +9,8 @@
 
 namespace kilvo {
 
-/// Between the oldest and the newest of a sensor that wait for the IMU; nothing older is propagated again.
-inline constexpr Duration longest_wait = std::chrono::seconds(2);
-
 /// When a measurement is complete: a scan at its last point, anything else at its stamp.
 Time completion_of(const Measurement& m);
-
 /// When the first and when the last point of a scan were taken.
 Time begin_of(const LidarScan& scan);
 Time end_of(const LidarScan& scan);
@@ -22,7 +18,6 @@ Time end_of(const LidarScan& scan);
 class ReorderBuffer {
  public:
   void push(Time completion, Measurement m);
-
   /// The first by completion; of the same time the IMU first, then by arrival. There must be one.
   Measurement pop();
   Time first() const { return heap_.front().completion; }

@@ -1,7 +1,5 @@
-// Puts measurements into the order of their stamps. A measurement is released when nothing of an earlier stamp can be expected any more
-// that must go before it, or when it has waited max_wait of the IMU's time.
-//
-// Scans are waited for from when the next one may be complete. So are images; but since a late one is fused all the same, one need not.
+// Puts measurements into the order of their stamps. One is released when nothing earlier can be expected any more, or when it has waited
+// max_wait of the IMU's time. Scans and images are waited for from when the next one may be complete; images need not be.
 #pragma once
 
 #include <array>
@@ -37,8 +35,7 @@ class Timeline {
   /// really passed; if not, its clock was wrong (time_jump).
   void push(Measurement m);
 
-  /// What was refused since the last call: also what waited when more of its sensor came than there is room for, because the IMU is silent
-  /// (no_imu).
+  /// What was refused since the last call; no_imu: the IMU is silent, and more of this sensor waited than there is room for.
   std::vector<Refusal> take_refused() { return std::exchange(refused_, {}); }
 
   /// The next measurement in order, if it need not wait.

@@ -213,7 +213,7 @@ TEST(Timeline, WithoutTheImuNoSensorFillsTheMemory) {
     most = std::max(most, waiting);
   }
   EXPECT_LE(most, 33u) << "of 2 MB each";
-  EXPECT_LE(scans, 22u) << "of 2 s";
+  EXPECT_LE(scans, 32u) << "of 3 s";
   EXPECT_GT(given_up, 400u);
 }
 
