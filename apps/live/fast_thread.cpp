@@ -5,7 +5,7 @@
 #include "apps/live/live_runner.hpp"
 #include "apps/live/raw.hpp"
 #include "apps/live/thread_settings.hpp"
-#include "kilvo/input/fault.hpp"
+#include "kilvo/input/health.hpp"
 
 namespace kilvo::live {
 namespace {

@@ -39,8 +39,7 @@ void Estimator::process(ImuSample s, std::vector<Output>& out) {
   history_.close(s.t);
   if (!status_.has_legs()) history_.take_closing_us();
   if (keep_plausible()) history_.remember_good();
-  constexpr Duration longest_history = std::chrono::seconds(2);  // without sweeps nothing older will be propagated again
-  if (s.t - history_.base().t > longest_history && frames_.empty()) history_.rebase_to_closed();
+  if (s.t - history_.base().t > longest_wait && frames_.empty()) history_.rebase_to_closed();
   choose_modality(s.t);
   findings_.look(s.t, situation());
   if (status_.modality() == Modality::coast && frames_.empty()) {

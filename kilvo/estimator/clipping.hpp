@@ -1,5 +1,4 @@
-// Finds IMU samples at the end of the sensor's range, where the true value may be anything beyond. The range is a setting, or is found: a
-// value that no other of its axis exceeds and that comes again, or one at a range that such sensors have.
+// Finds IMU samples at the end of the sensor's range: a setting, or found as the largest value of an axis that comes again or is usual.
 #pragma once
 
 #include <array>

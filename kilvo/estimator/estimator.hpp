@@ -1,4 +1,4 @@
-// The estimator: measurements in, states out. Values only: it never throws after construction, never prints, never asks the time.
+// The estimator: measurements in, states out. It never throws after construction, never prints, and knows no time but that of the data.
 //
 // A measurement goes through the InputQueue. IMU and leg samples go into the History at once (the asynchronous phase). Scans and images
 // wait for the IMU, are registered by their pipelines at their own times, and the result becomes the base of the History (the sequential
@@ -15,10 +15,10 @@
 #include "kilvo/estimator/frame_queue.hpp"
 #include "kilvo/estimator/history.hpp"
 #include "kilvo/estimator/imu_watch.hpp"
+#include "kilvo/estimator/initialise.hpp"
 #include "kilvo/estimator/moving_start.hpp"
 #include "kilvo/estimator/output_queue.hpp"
 #include "kilvo/estimator/sensor_status.hpp"
-#include "kilvo/estimator/starter.hpp"
 #include "kilvo/estimator/world_map.hpp"
 #include "kilvo/input/input_queue.hpp"
 #include "kilvo/legs/leg_pipeline.hpp"
@@ -38,23 +38,22 @@ class Estimator {
   Estimator& operator=(Estimator&&) noexcept;
   ~Estimator();
 
-  /// The surroundings are known: sweeps are registered to this map, in the estimator's world, and leave it as it is. Before any push.
+  /// Sweeps are registered to this map, in the estimator's world, and do not change it. Before any push.
   void give_map(VoxelMap map) { map_.give(std::move(map)); }
 
-  /// Takes a measurement in the order of its arrival; returns what became known, in time order.
+  /// Takes a measurement in the order of arrival; returns the new outputs in time order.
   std::vector<Output> push(Measurement m);
-  /// The same, appended to `out`: a caller that uses one vector again and again spares the leg path its only allocation.
+  /// The same, appended to `out`: with one vector used again the leg path allocates nothing.
   void push(Measurement m, std::vector<Output>& out);
 
-  /// For who cannot wait for sweeps and images: sets a live propagator to the present state, from which it goes on by itself. False, and
-  /// nothing is changed, before the start.
+  /// Sets a live propagator to the present state. False, and nothing is changed, before the start.
   bool fork(LivePropagator& into) const;
 
   /// No more measurements will come: what still waits is processed.
   std::vector<Output> finish();
   void finish(std::vector<Output>& out);
 
-  /// Why leg messages like this one cannot be used with this robot, if so: the first of them decides whether a run makes sense.
+  /// Why leg messages like this one cannot be used with this robot; none: they can.
   std::optional<std::string> mismatch(const JointSample& s) const;
 
   const Statistics& statistics() const { return findings_.statistics(); }
@@ -87,8 +86,7 @@ class Estimator {
   void choose_modality(Time t);
   bool keep_plausible(bool definite = false);  // `definite`: looks at the whole covariance
   Findings::Situation situation() const;
-  // What the filter's covariance lacks of the error relative to the first pose: of the map or of where it began, of the LiDAR's mount, of
-  // the legs' description.
+  // What P lacks of the error relative to the first pose: errors of the map, of the LiDAR's mount and of the legs' description.
   PoseCovariance common_error(const State& x) const;
   void emit(const Estimate& e, std::vector<Output>& out, std::optional<Contacts> contacts = {}, double kinematic_us = 0,
             double contact_us = 0);

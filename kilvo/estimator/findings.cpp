@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kilvo/estimator/initialise.hpp"
 #include "kilvo/math/decimals.hpp"
 #include "kilvo/sensors/robot.hpp"
 
@@ -14,12 +15,11 @@ constexpr Duration streams_period = std::chrono::seconds(1), use_period = std::c
 // Fewer messages than these say nothing of a sensor.
 constexpr std::uint64_t few = 20;
 // What differs from the biases at the start by more than this is no bias: of a sensor that drifts, and of none at all, m/s^2, rad/s.
-constexpr double strange_accel = 0.3, impossible_accel = 0.8, strange_gyro = 0.03, impossible_gyro = 0.1;
+constexpr double strange_accel = 0.3, impossible_accel = 0.8, strange_gyro = 0.03;
 // Three times the speed at which no leg of this length can walk (Froude number 1): nobody runs faster either.
 constexpr double fastest = 3.0;
-// So many times within so long nothing stood still under the robot, and the velocity was given up.
+// So many times within use_period nothing stood still under the robot, and the velocity was given up.
 constexpr std::uint64_t most_lost_stances = 3;
-constexpr Duration remembered = std::chrono::seconds(10);
 
 // What every start has, and what the user asked for.
 bool is_usual(Reason r) {
@@ -55,9 +55,11 @@ void Findings::look(Time t, const Situation& now) {
   if (t - streams_looked_at_ < streams_period) return;
   streams_looked_at_ = t;
   report_streams(now);
-  look_at_agreement(t, now);
+  judge_speed(now);
+  judge_biases(now);
   if (t - use_looked_at_ < use_period) return;
   use_looked_at_ = t;
+  judge_stances(now);
   report_use(used_before_, now);
   for (std::size_t s = 0; s < sensor_count; ++s) used_before_.used[s] = statistics_.sensors[s].used;
   used_before_.dropped = drops_;
@@ -170,12 +172,7 @@ void Findings::contradict(Reason reason, Sensor a, Sensor b, double value, const
   report(now, {}, reason, value, std::string(words_for(a)) + " and " + words_for(b) + " contradict each other: " + why);
 }
 
-void Findings::look_at_agreement(Time t, const Situation& now) {
-  if (agreement_looked_at_ == Time{}) agreement_looked_at_ = t;
-  judge_speed(now);
-  judge_biases(now);
-  if (t - agreement_looked_at_ < remembered) return;
-  agreement_looked_at_ = t;
+void Findings::judge_stances(const Situation& now) {
   const std::uint64_t lost = statistics_.lost_stances - lost_stances_before_;
   lost_stances_before_ = statistics_.lost_stances;
   if (lost >= most_lost_stances && !statistics_.diverged)
@@ -203,7 +200,7 @@ void Findings::judge_biases(const Situation& now) {
   const auto beyond = [&](const Biases& before, double accel, double gyro) {
     return (present.accel - before.accel).norm() > accel + 3 * accel_sigma || (present.gyro - before.gyro).norm() > gyro + 3 * gyro_sigma;
   };
-  const bool impossible = beyond(*first_biases_, impossible_accel, impossible_gyro);
+  const bool impossible = beyond(*first_biases_, impossible_accel, largest_gyro_bias);
   if (impossible ? statistics_.diverged : strange_biases_ || !beyond(*known_biases_, strange_accel, strange_gyro)) return;
   strange_biases_ = true;
   const Biases& before = impossible ? *first_biases_ : *known_biases_;

@@ -1,5 +1,4 @@
-// What the estimator reports beside its states: counts of messages, events as they become true, and whether what the sensors say can be
-// true together. What cannot is reported with the two that contradict each other.
+// What the estimator reports beside its states: counts of messages, events, and contradictions between two sensors.
 #pragma once
 
 #include <array>
@@ -75,7 +74,7 @@ class Findings {
   SensorCount& of(Sensor s) { return statistics_.sensors[index_of(s)]; }
   void report_streams(const Situation& now);
   void report_use(const Use& before, const Situation& now);
-  void look_at_agreement(Time t, const Situation& now);
+  void judge_stances(const Situation& now);
   void judge_speed(const Situation& now);
   void judge_biases(const Situation& now);
 
@@ -83,7 +82,7 @@ class Findings {
   EventLog events_;
   std::array<std::array<std::uint64_t, reason_count>, sensor_count> drops_{};  // by Sensor and Reason
   Use used_before_;
-  Time streams_looked_at_{}, use_looked_at_{}, agreement_looked_at_{};
+  Time streams_looked_at_{}, use_looked_at_{};
   struct Biases {
     Eigen::Vector3d accel, gyro;  // m/s^2, rad/s
   };

@@ -3,13 +3,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "kilvo/input/timeline.hpp"
+#include "kilvo/input/reorder_buffer.hpp"
 
 namespace kilvo {
 namespace {
-
-// More of scans and images is not worth waiting for the IMU.
-constexpr Duration longest_wait = std::chrono::seconds(2);
 
 bool is_scan(const FrameQueue::Frame& f) { return std::holds_alternative<LidarScan>(f.what); }
 

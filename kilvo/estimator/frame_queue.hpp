@@ -1,5 +1,4 @@
-// Scans and images that wait for the IMU, and the order in which they update the state: that of their own times, the middle of a scan, the
-// stamp of an image.
+// Scans and images that wait for the IMU. They update the state in the order of their times: the middle of a scan, the stamp of an image.
 #pragma once
 
 #include <deque>
@@ -11,6 +10,9 @@
 #include "kilvo/sensors/measurement.hpp"
 
 namespace kilvo {
+
+/// Scans and images wait no longer for the IMU; nothing older is propagated again.
+inline constexpr Duration longest_wait = std::chrono::seconds(2);
 
 class FrameQueue {
  public:

@@ -1,7 +1,5 @@
-// The estimate over time. The base is what the last sweep or image left, at its own time, or an IMU sample when none came for long; every
-// later estimate is the base carried on by the IMU samples and leg updates since then. When a sweep corrects its own time, the base is
-// replaced and all that came since is propagated again (Replay): the asynchronous and the sequential phase of the paper meet here and
-// nowhere else.
+// The estimate over time: a base, after the last sweep or image (or an IMU sample when none came for long), and the IMU samples and leg
+// updates since then. A sweep that corrects its own time replaces the base, and all that came since is propagated again (Replay).
 #pragma once
 
 #include <array>
@@ -34,14 +32,12 @@ class History {
 
   /// The estimate of a time not before the base. What was passed on the way is in the trajectory.
   Estimate at(Time t) { return record_from(base_, t); }
-  /// For a sweep around `middle` until `end`: the same, but that what the accelerometer reported since the base is wrong; or, if the sweep
-  /// is `off` by so much (m), that the velocity of the base is less certain. None when it was too long ago, or that is too much. Its now()
-  /// and closed() are what they are here.
+  /// For a sweep around `middle` until `end`: a history that does not trust the accelerometer since the base; or, if the sweep is `off` by
+  /// so much (m), one whose base has a less certain velocity. None when it is too long ago, or too much. now() and closed() stay.
   std::optional<History> doubted(Time middle, Time end, std::optional<double> off) const;
   /// The estimate at `until` if it was `e` before. The poses on the way are in the trajectory.
   Estimate record_from(const Estimate& e, Time until);
-  /// How the IMU moved from `t` to the base: its poses at both, as the trajectory has them; the same when `t` is not before the base. None
-  /// when it is too long before.
+  /// Poses of the trajectory at `t` and at the base; the same twice when `t` is not before the base, none when it is too long before.
   struct Motion {
     SE3 begin, end;
   };
@@ -87,9 +83,8 @@ class History {
   /// now() made no sense: back to the last good estimate, carried on with what a robot may have done since. Returns how long ago it was, s.
   double roll_back();
 
-  /// For a runner of its own: becomes what is needed to go on from the newest IMU sample of `other`. A fork has no base and no trajectory:
-  /// only now(), closed(), add(), predict_to(), take(), settle_leg_update() and close_fork() are for it. Allocates only when it has never
-  /// held so much; records no trajectory.
+  /// For the live propagator: becomes what is needed to go on from the newest IMU sample of `other`. A fork has no base and no trajectory:
+  /// only now(), closed(), add(), predict_to(), take(), settle_leg_update() and close_fork() are for it. Allocates only to grow.
   void fork_from(const History& other);
   /// Of a fork: closes the intervals up to the newest IMU sample that is not after `until`, keeps what came later and forgets what came
   /// before. `legs`: the newest leg update, if any.

@@ -1,4 +1,4 @@
-// What the IMU's samples say by themselves, before they are integrated: their unit, whether they can be believed, whether the robot stands.
+// Checks of the IMU's samples before they are integrated: unit, plausibility, clipping, standstill.
 #pragma once
 
 #include <optional>
@@ -19,18 +19,17 @@ class ImuWatch {
   /// Accelerations are `scale` times what the samples say, in m/s^2.
   void set_scale(double scale) { accel_scale_ = scale; }
 
-  /// Brings a sample to m/s^2 and marks what is clipped. Says why it is not to be used.
+  /// Converts a sample to m/s^2 and marks what is clipped. Returns why it must not be used.
   std::optional<Reason> prepare(ImuSample& s);
-  /// A sample that is used; what is known of the gyro's bias.
+  /// A sample that is used, and the estimated gyro bias.
   void add(const ImuSample& s, const Eigen::Vector3d& gyro_bias) { stationarity_.add(s, gyro_bias); }
   /// The IMU was silent.
   void restart() { stationarity_.restart(); }
 
-  /// The acceleration has been a usual one for long enough: no impact.
+  /// The acceleration has been usual for 20 ms: no impact.
   bool is_calm(Time t) const { return stationarity_.is_usual(t, std::chrono::milliseconds(20)); }
 
-  /// With no other sensor: the estimate, if the robot looks like one at rest at `s` and this has not been said just now. It does not move,
-  /// and up is where the accelerometer says.
+  /// Without another sensor: the estimate after a zero-velocity update, if the robot is at rest at `s` and the last one is long ago enough.
   std::optional<Estimate> zero_velocity_update(const Estimate& e, const ImuSample& s, const UpdateConfig& config);
 
  private:

@@ -1,7 +1,11 @@
 #include "kilvo/estimator/initialise.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "kilvo/filter/stationarity.hpp"
+#include "kilvo/input/reorder_buffer.hpp"
 
 namespace kilvo {
 namespace {
@@ -86,7 +90,6 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   const auto gyro = statistics_of(window_, &ImuSample::gyro);
   const auto accel = statistics_of(window_, &ImuSample::accel);
   const double unit = unit_of(accel.mean.norm());
-  constexpr double usual_gyro_bias = 0.03, largest_gyro_bias = 0.1;  // rad/s; a larger mean is motion
   // A slow sway has a small deviation and is no rest: its rate would be taken for the bias. It shows as a change within the window.
   constexpr double largest_change = 0.004;  // rad/s
   const auto middle = window_.begin() + static_cast<std::ptrdiff_t>(window_.size() / 2);
@@ -97,7 +100,7 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   const Eigen::Vector3d turned = statistics_of(newer, &ImuSample::accel).mean - statistics_of(older, &ImuSample::accel).mean;
   const double noise = accel.sigma.norm() * std::sqrt(4.0 / static_cast<double>(window_.size()));
   const bool gravity_stays = by_motion.norm() < 3 * noise || turned.dot(by_motion) < 0.5 * by_motion.squaredNorm();
-  const bool is_bias = gyro.mean.norm() < usual_gyro_bias || (gyro.mean.norm() < largest_gyro_bias && gravity_stays);
+  const bool is_bias = gyro.mean.norm() < largest_resting_rate || (gyro.mean.norm() < largest_gyro_bias && gravity_stays);
   const bool still = gyro.sigma.maxCoeff() < config_.still_gyro && is_bias && change.cwiseAbs().maxCoeff() < largest_change &&
                      accel.sigma.maxCoeff() * unit < config_.still_accel &&
                      largest_change_of_velocity(window_, accel.mean) * unit < config_.velocity_sigma;
@@ -150,6 +153,30 @@ Start Initialiser::start(bool still) const {
     e.P.diagonal().segment<3>(at::v).array() += 1.0;
   }
   return out;
+}
+
+std::optional<Start> Starter::add(Measurement m) {
+  std::optional<Start> start;
+  if (const auto* imu = std::get_if<ImuSample>(&m)) start = initialiser_.add(*imu);
+  kept_.push_back(std::move(m));
+  bound_images();
+  // A moving start looks this far back and no farther.
+  const Time oldest = completion_of(kept_.back()) - from_seconds(moving_start_ + 1.0);
+  while (completion_of(kept_.front()) < oldest) {
+    dropped_.push_back(sensor_of(kept_.front()));
+    kept_.pop_front();
+  }
+  return start;
+}
+
+// Images are large, and only those of the still window will be of use.
+void Starter::bound_images() {
+  const auto* image = std::get_if<CameraImage>(&kept_.back());
+  if (image == nullptr) return;
+  const auto is_old = [oldest = image->t - 2 * still_time_](const Measurement& m) {
+    return std::holds_alternative<CameraImage>(m) && stamp_of(m) < oldest;
+  };
+  dropped_.insert(dropped_.end(), std::erase_if(kept_, is_old), Sensor::camera);
 }
 
 }  // namespace kilvo

@@ -1,7 +1,7 @@
 #include "kilvo/estimator/live_propagator.hpp"
 
 #include "kilvo/filter/gap.hpp"
-#include "kilvo/input/fault.hpp"
+#include "kilvo/input/health.hpp"
 #include "kilvo/math/stopwatch.hpp"
 
 namespace kilvo {

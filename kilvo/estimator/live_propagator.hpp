@@ -1,6 +1,5 @@
-// The asynchronous phase by itself, ahead of the estimator: what the IMU and the legs say at once, on top of a state that a sweep or an
-// image still waits to correct. A value that the estimator fills (Estimator::fork) and that then goes on alone, until the next one. It runs
-// the same History and LegPipeline. docs/decisions/live.md says why.
+// The asynchronous phase by itself, ahead of an estimator that still works on a sweep or an image (docs/decisions/live.md). It starts from
+// the estimator's state (Estimator::fork) and runs the same History and LegPipeline.
 #pragma once
 
 #include "kilvo/estimator/history.hpp"
@@ -17,8 +16,8 @@ class LivePropagator {
  public:
   LivePropagator(const Robot& robot, const EstimatorConfig& config);
 
-  /// Each takes a measurement in the order of its arrival and says whether there is a new output. One that it knows already, that is late,
-  /// or that is too far ahead to be believed is ignored: the estimator sees it as well. Neither allocates, once warm.
+  /// Each takes a measurement in the order of arrival and returns whether there is a new output. One that is known, late or too far ahead
+  /// is ignored: the estimator sees it as well. Neither allocates, once warm.
   bool push(const ImuSample& s);
   bool push(const Feet& feet);
 

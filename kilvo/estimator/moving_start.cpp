@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "kilvo/input/timeline.hpp"
+#include "kilvo/input/reorder_buffer.hpp"
 
 namespace kilvo {
 namespace {

@@ -1,5 +1,5 @@
-// A start on the move without legs. While the velocity is not known a sweep has no shape, but its parts are short enough to have one, and
-// from part to part the robot moves by its velocity. Once that is known, all else begins as if it had been known from the start.
+// A start on the move without legs. While the velocity is unknown, short parts of sweeps are registered one after the other: they smear
+// little, and the robot moves by its velocity from part to part. Then all else begins.
 #pragma once
 
 #include <optional>

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "kilvo/input/timeline.hpp"
+#include "kilvo/input/reorder_buffer.hpp"
 
 namespace kilvo {
 

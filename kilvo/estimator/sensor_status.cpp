@@ -14,7 +14,6 @@ SensorStatus::SensorStatus(const Robot& robot, std::string_view settling)
 }
 
 bool SensorStatus::are_legs_silent(Duration since) const {
-  constexpr Duration least_silence = std::chrono::milliseconds(50);
   return since > std::max(least_silence, from_seconds(5 / rate_of(Sensor::legs)));
 }
 
@@ -27,9 +26,8 @@ void SensorStatus::begin(Time t, const std::array<bool, sensor_count>& there) {
 }
 
 void SensorStatus::use(Sensor s, Time t) {
-  constexpr double longest = 0.1;  // s
   Track& of = track(s);
-  if (s == Sensor::legs && of.used) leg_period_ = std::min(longest, to_seconds(t - *of.used));
+  if (s == Sensor::legs && of.used) leg_period_ = std::min(blind_gap, to_seconds(t - *of.used));
   of.used = t;
   of.was_used = true;
   of.waits_since.reset();

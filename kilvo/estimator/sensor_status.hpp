@@ -1,4 +1,4 @@
-// Which sensors are there and used, and the modality that follows: all decisions on modality are here.
+// Which sensors are available and used, and the modality that follows. All decisions on modality are here.
 #pragma once
 
 #include <array>
@@ -18,40 +18,39 @@ class SensorStatus {
   /// `settling`: see EstimatorConfig.
   explicit SensorStatus(const Robot& robot, std::string_view settling = "legs");
 
-  /// The first estimate is of `t`. `there`: by Sensor; legs and LiDAR are taken as used until they stay silent.
+  /// The first estimate is of `t`. `there`: by Sensor; legs and LiDAR count as used until they are silent.
   void begin(Time t, const std::array<bool, sensor_count>& there);
 
-  /// Something of this sensor at `t` (of a scan: its end) carried the estimate.
+  /// A measurement of this sensor at `t` (of a scan: its end) updated the estimate.
   void use(Sensor s, Time t);
-  /// When it carried the estimate last, or the start; of legs that are lost: never.
+  /// When it updated the estimate last, or the start; none for legs that are lost.
   std::optional<Time> last_used(Sensor s) const { return tracks_[index_of(s)].used; }
   void lose_legs();
-  /// They are lost, and nothing else is asked about: who runs ahead cannot know why.
+  /// For the live propagator, which does not know the reason: the legs are lost.
   void miss_legs();
   bool has_legs() const { return last_used(Sensor::legs).has_value(); }
 
-  /// The legs have been silent for so long, or say the same for so long, that they count as lost. `imu_heard`: the newest IMU sample
-  /// before this one; where the IMU was silent as well, nobody can say it.
+  /// The legs have been silent, or frozen, for so long that they count as lost. `imu_heard`: the newest IMU sample before this one; while
+  /// the IMU is silent as well, this is not known.
   bool are_legs_lost(Time imu_heard, const Health& health) const;
   bool are_legs_silent(Duration since) const;
-  /// While the legs are used their samples carry the outputs, unless one comes so late that the IMU's must.
+  /// While the legs are used, outputs come with their samples; with IMU samples when a leg sample is overdue.
   bool are_legs_overdue(Time t) const;
-  /// Legs so long after the newest IMU sample are no odometry.
+  /// A leg sample so long after the newest IMU sample cannot be used.
   bool is_imu_missing(Duration since) const;
-  /// Legs that come again in the middle of an impact would start with wrong contacts (paper, Section IV-E), and which foot stands is told
-  /// by what is still, for which the velocity must be known: whether those of `t` may be used, or have waited for long enough.
+  /// Whether legs that come back at `t` may be used: an impact would give wrong contacts (paper, Section IV-E), and contacts need a known
+  /// velocity. True in any case after a second.
   bool may_legs_return(Time t, bool is_calm, bool is_velocity_known, const Health& health);
 
-  /// A sweep or image of a sensor that was lost comes in the middle of an impact: it waits as the legs do, but not for ever.
+  /// The same for a sweep or image of a sensor that was lost.
   bool may_frame_return(Sensor s, Time t, bool is_calm);
 
-  /// From now on there is no pose, or there is one again.
   void lose_imu(const Health& health);
   void imu_is_back() { imu_lost_ = false; }
   bool imu_lost() const { return imu_lost_; }
 
   enum class Change : std::uint8_t { none, of_cause, of_modality };
-  /// Decides on the modality of `t` from what was used until then. Of the cause alone: the IMU has come back, and nothing else is there.
+  /// Decides on the modality of `t` from what was used until then. `of_cause`: only the IMU has come back.
   Change choose(Time t, const Health& health);
   Modality modality() const { return modality_; }
   Reason cause() const { return cause_; }  // of the last change

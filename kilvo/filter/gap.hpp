@@ -4,11 +4,9 @@
 #include <algorithm>
 
 #include "kilvo/filter/state.hpp"
+#include "kilvo/sensors/silence.hpp"
 
 namespace kilvo {
-
-/// After an IMU gap longer than this nothing is known of the motion in between but that it was a walking robot's, s.
-inline constexpr double blind_gap = 0.1;
 
 /// Of a stream: messages that are so many periods apart have one missing between them, whatever the jitter.
 inline constexpr double periods_of_a_gap = 2.5;

@@ -9,6 +9,8 @@ namespace kilvo {
 
 /// theta_d of the paper: what is so many standard deviations from its usual is an impact, a motion.
 inline constexpr double unusual_deviation = 10;
+/// A mean rate that is larger, beyond the bias that is known, is motion, rad/s.
+inline constexpr double largest_resting_rate = 0.03;
 
 /// What the IMU alone says of the motion: whether it stands still, and how unusual the acceleration is now. No memory of samples, so
 /// that it costs nothing.

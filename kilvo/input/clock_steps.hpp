@@ -1,5 +1,6 @@
-// Clocks that step back: the computer's time was set, or a recording is played in a loop; and an IMU whose clock steps either way by
-// itself, which the legs tell. What comes after the step is put after what came before, as it was measured.
+// Clocks that step. Every stamp of the IMU that is not where the next one was due is one of four things: late (a gap is filled), wrong,
+// the first after a gap, or of a clock that has stepped, alone or with the others. The stamps that follow it decide, and how long after
+// the IMU the messages of the others come. What comes after a step is put after what came before, as it was measured.
 #pragma once
 
 #include <array>
@@ -7,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "kilvo/input/clock_model.hpp"
 #include "kilvo/sensors/measurement.hpp"
 #include "kilvo/sensors/reason.hpp"
 
@@ -30,35 +32,37 @@ class ClockSteps {
   Duration last() const { return last_; }
 
  private:
+  struct Clock : ClockModel {
+    Duration offset{};                  // added to its stamps
+    std::optional<Duration> usual_lag;  // of its stamps behind the IMU's newest, the mean
+    Time may_step_until = Time::min();  // until then its messages show whether it went with the IMU's step
+  };
+  // Stamps of the IMU in a row that are not where the next one was due, but follow each other.
+  struct Run {
+    int length = 0;
+    Time first{}, newest{};
+    int with = 0, without = 0;  // messages of the others meanwhile that went with them, and that did not
+    void add(Time t);
+  };
   std::optional<Reason> follow_imu(Time t);
+  void follow_other(Clock& clock, Time t);
   bool is_sure() const;
   bool has_run_ahead(Time now) const;
-  bool must_wait(Time now);
-  void note_hole(Time until) { holes_[next_hole_++ % holes_.size()] = {*imu_, until}; }
   bool is_late(Time now) const;
+  void note_hole(Time until) { holes_[next_hole_++ % holes_.size()] = {*imu().newest, until}; }
   void restart(Time imu);
-  void vote(std::size_t s, Time t);
+  void vote(const Clock& clock, Time t);
+  Clock& imu() { return clocks_[index_of(Sensor::imu)]; }
+  const Clock& imu() const { return clocks_[index_of(Sensor::imu)]; }
+  const Clock& legs() const { return clocks_[index_of(Sensor::legs)]; }
 
-  std::array<Duration, sensor_count> offset_{};  // added to the stamps, by Sensor
-  // By which the stamps of each trail the IMU's as they arrive.
-  std::array<std::optional<Duration>, sensor_count> lag_;
-  // Whether each goes with the IMU is found out from its first messages after a step.
-  std::array<bool, sensor_count> open_{};
-  std::array<std::optional<Time>, sensor_count> open_until_;
-  std::array<std::optional<Time>, sensor_count> newest_;  // of each, with its offset
-  std::optional<Time> imu_;                               // the newest, with its offset
-  std::array<std::pair<Time, Time>, 4> holes_{};          // between stamps of the IMU, the last ones
+  std::array<Clock, sensor_count> clocks_;        // newest: with the offset
+  std::array<std::pair<Time, Time>, 4> holes_{};  // between stamps of the IMU, the last ones
   std::size_t next_hole_ = 0;
-  std::optional<Time> suspect_;  // a stamp of the IMU ahead of what was due
+  std::optional<Time> suspect_;  // the newest stamp of the IMU, when it was ahead of what was due
   bool went_on_ = false;
-  Duration period_ = std::chrono::seconds(1);  // of the IMU, lately
-  std::optional<Time> legs_;                   // the newest, with its offset
-  std::optional<Time> legs_then_;              // when the IMU spoke last
-  std::optional<Duration> legs_behind_;        // by which they trail the IMU when it speaks
-  Duration legs_spacing_ = std::chrono::seconds(1);
-  int elsewhere_ = 0;                    // IMU samples in a row of another time
-  Time first_there_{}, newest_there_{};  // of them
-  int for_ = 0, against_ = 0;            // messages of the others meanwhile that went with them, and that did not
+  std::optional<Time> legs_then_;  // of the legs, the newest when the IMU spoke last
+  Run run_;
   std::uint64_t count_ = 0, restarts_ = 0;
   Duration last_{};
 };

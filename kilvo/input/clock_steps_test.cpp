@@ -212,6 +212,24 @@ TEST(ClockSteps, OneStampOfTheImuAheadOfAllOthersCostsOneSample) {
   }
 }
 
+// For 0.9 s its messages come 0.45 s late, then at once again: late ones come between those that do not.
+TEST(ClockSteps, AnImuThatComesLateForAMomentHasNotStepped) {
+  StampedRobot r;
+  r.walk(seconds(2), {}, {});
+  const Duration from = r.now, until = from + milliseconds(900), late = milliseconds(450);
+  for (const Duration end = until + seconds(1); r.now < end; r.now += milliseconds(1)) {
+    const bool is_due = r.now % milliseconds(5) == Duration(0);
+    if (is_due && r.now - late >= from && r.now - late < until) r.note(ImuSample{.t = at(r.now - late)}, r.now - late, r.worst_imu);
+    if (is_due && r.now >= until) r.note(ImuSample{.t = at(r.now)}, r.now, r.worst_imu);
+    JointSample joints;
+    joints.t = at(r.now - milliseconds(3));
+    r.note(joints, r.now - milliseconds(3), r.worst_legs);
+  }
+  EXPECT_EQ(r.clocks.count(), 0u);
+  EXPECT_LE(r.refused, 90) << "of those that were late when newer ones had come";
+  EXPECT_EQ(r.worst_imu, Duration(0));
+}
+
 // Samples are missing, as many stamps shake by 2 ms, and nobody else speaks.
 TEST(ClockSteps, GapsAndJitterOfAnImuAloneCostNothing) {
   for (const int gap : {0, 20, 60, 100, 200, 400}) {

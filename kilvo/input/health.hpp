@@ -1,4 +1,4 @@
-// What is wrong with the sensors' messages themselves, seen as they arrive: rate, jitter, repeated values, clipped values, clocks.
+// Plausibility of the sensors' messages as they arrive: absurd, repeated and clipped values, rate, jitter, clocks.
 #pragma once
 
 #include <array>
@@ -11,6 +11,11 @@
 #include "kilvo/sensors/robot.hpp"
 
 namespace kilvo {
+
+/// What is wrong with a measurement by itself; none: nothing.
+std::optional<Reason> fault_of(const ImuSample& s);
+std::optional<Reason> fault_of(const JointSample& s);
+std::optional<Reason> fault_of(const Measurement& m);
 
 /// What was seen of one sensor's messages.
 struct StreamHealth {

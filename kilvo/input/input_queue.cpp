@@ -1,8 +1,7 @@
 #include "kilvo/input/input_queue.hpp"
 
 #include <algorithm>
-
-#include "kilvo/input/fault.hpp"
+#include <iterator>
 
 namespace kilvo {
 
@@ -43,13 +42,12 @@ void InputQueue::admit(Measurement m, std::optional<Reason> off_clock) {
   if (off_clock) return refuse(s, *off_clock);
   if (const auto fault = health_.judge(m)) return refuse(s, *fault);
   std::visit([by = shift_[index_of(s)]](auto& what) { what.t += by; }, m);
-  if (const auto refused = timeline_.push(std::move(m))) refuse(s, *refused);
-  for (const Sensor jumped : timeline_.take_jumped()) refuse(jumped, Reason::time_jump);
-  for (const Sensor waited : timeline_.take_given_up()) refuse(waited, Reason::no_imu);
+  timeline_.push(std::move(m));
+  std::ranges::copy(timeline_.take_refused(), std::back_inserter(refused_));
 }
 
 double InputQueue::shift_by(Sensor s, double by) {
-  constexpr double longest = 0.2;  // s
+  const double longest = to_seconds(max_wait_);  // later ones could not wait for those of their time
   Duration& shift = shift_[index_of(s)];
   const double total = std::clamp(to_seconds(shift) + by, -longest, longest);
   shift = from_seconds(total);
@@ -59,7 +57,7 @@ double InputQueue::shift_by(Sensor s, double by) {
 void InputQueue::end() {
   if (doubted_) admit(*std::exchange(doubted_, std::nullopt), Reason::time_jump);
   timeline_.end();
-  for (const Sensor jumped : timeline_.take_jumped()) refuse(jumped, Reason::time_jump);
+  std::ranges::copy(timeline_.take_refused(), std::back_inserter(refused_));
 }
 
 InputQueue InputQueue::next_epoch() {

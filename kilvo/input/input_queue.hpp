@@ -27,10 +27,6 @@ class InputQueue {
   /// No more measurements will come: nothing waits any longer.
   void end();
 
-  struct Refusal {
-    Sensor sensor;
-    Reason reason;
-  };
   /// What was not let through since the last call.
   std::vector<Refusal> take_refused() { return std::exchange(refused_, {}); }
 

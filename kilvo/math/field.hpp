@@ -1,6 +1,5 @@
-// One setting of a configuration struct: its name, the member, its unit and one sentence. A configuration struct lists its
-// fields once, as `static constexpr auto fields()` returning a std::tuple of Field; YAML loading, `--set`, `kilvo config show`
-// and docs/parameters.md all come from that list.
+// One setting of a configuration struct. The struct lists its fields once, as `static constexpr auto fields()` returning a std::tuple of
+// Field; YAML loading, `--set`, `kilvo config show` and docs/parameters.md all come from that list.
 #pragma once
 
 #include <string_view>

@@ -1,8 +1,5 @@
-// Why something happened: a message was not used, the modality changed, a finding about a sensor became true. Every reason has one name (in
-// files) and one text (for people), both in the table below; decisions compare the enumerators.
-//
-// To add a reason: an enumerator, a row of the table in the same place (a static_assert holds the two together), and Estimator::report
-// where it becomes true.
+// Reasons: why a message was not used, why the modality changed, what was found about a sensor. Each has an enumerator, for decisions, and
+// in the same place of the table a name (in files) and a text (for people).
 #pragma once
 
 #include <array>

@@ -4,7 +4,7 @@ import unittest
 
 from planted_tree import PlantedTree
 
-LIMIT = 490
+LIMIT = 473
 
 
 class CheckConstants(PlantedTree):
