@@ -131,6 +131,25 @@ Camera::Camera(const CameraMount& mount)
   const double end = fisheye_ ? std::numbers::pi / 2 : widest_radius;
   const std::vector<double> turns = roots_of(growth_of(k_, fisheye_), end);
   largest_ = turns.empty() ? end : turns.front();
+  window_ = find_window();
+}
+
+Camera::Window Camera::find_window() const {
+  Window window;
+  const double w = width_ - 1, h = height_ - 1;
+  constexpr int steps = 16;
+  for (int k = 0; k <= steps; ++k) {
+    const double s = static_cast<double>(k) / steps;
+    for (const Eigen::Vector2d& pixel :
+         {Eigen::Vector2d(s * w, 0), Eigen::Vector2d(s * w, h), Eigen::Vector2d(0, s * h), Eigen::Vector2d(w, s * h)}) {
+      const auto ray = unproject(pixel);
+      constexpr float all = 1e6F;  // it sees up to a limit of its own: project() decides
+      if (!ray) return {-all, all, -all, all};
+      const auto x = static_cast<float>(ray->x()), y = static_cast<float>(ray->y());
+      window = {std::min(window.left, x), std::max(window.right, x), std::min(window.top, y), std::max(window.bottom, y)};
+    }
+  }
+  return window;
 }
 
 std::optional<Eigen::Vector2d> Camera::project(const Eigen::Vector3d& p_C) const {

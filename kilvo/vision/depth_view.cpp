@@ -11,37 +11,9 @@ constexpr double in_front_share = 0.02, in_front_least = 0.08;  // of the depth;
 // Nearer than this the camera sees blur and the robot itself.
 constexpr float least_depth = 0.2F;  // m
 
-// Bounds of x/z and y/z that the image can hold, so that most points need no distortion.
-struct Window {
-  float left = 0, right = 0, top = 0, bottom = 0;
-
-  void take(const Eigen::Vector3d& ray) {
-    const Eigen::Vector3f r = ray.cast<float>();
-    left = std::min(left, r.x());
-    right = std::max(right, r.x());
-    top = std::min(top, r.y());
-    bottom = std::max(bottom, r.y());
-  }
-  bool holds(const Eigen::Vector3f& p) const {
-    return p.x() >= left * p.z() && p.x() <= right * p.z() && p.y() >= top * p.z() && p.y() <= bottom * p.z();
-  }
-};
-
-Window window_of(const Camera& camera) {
-  Window window;
-  const double w = camera.width() - 1, h = camera.height() - 1;
-  constexpr int steps = 16;
-  for (int k = 0; k <= steps; ++k) {
-    const double s = static_cast<double>(k) / steps;
-    for (const Eigen::Vector2d& pixel :
-         {Eigen::Vector2d(s * w, 0), Eigen::Vector2d(s * w, h), Eigen::Vector2d(0, s * h), Eigen::Vector2d(w, s * h)}) {
-      const auto ray = camera.unproject(pixel);
-      constexpr float all = 1e6F;  // it sees up to a limit of its own: project() decides
-      if (!ray) return {-all, all, -all, all};
-      window.take(*ray);
-    }
-  }
-  return window;
+// False: the image cannot show it. So most points need no distortion.
+bool may_hold(const Camera::Window& window, const Eigen::Vector3f& p) {
+  return p.x() >= window.left * p.z() && p.x() <= window.right * p.z() && p.y() >= window.top * p.z() && p.y() <= window.bottom * p.z();
 }
 
 }  // namespace
@@ -51,12 +23,11 @@ DepthView::DepthView(const Camera& camera, const SE3& T_CW, std::span<const Eige
       columns_(camera.width() / cell + 1),
       rows_(camera.height() / cell + 1),
       nearest_(static_cast<std::size_t>(columns_ * rows_), none) {
-  const Window window = window_of(camera);
   const Eigen::Matrix3f R = T_CW.R.matrix().cast<float>();
   const Eigen::Vector3f t = T_CW.p.cast<float>();
   for (std::uint32_t i = 0; i < points_W.size(); ++i) {
     const Eigen::Vector3f p_C = R * points_W[i].head<3>() + t;
-    if (p_C.z() < least_depth || !window.holds(p_C)) continue;
+    if (p_C.z() < least_depth || !may_hold(camera.window(), p_C)) continue;
     const auto pixel = camera.project(p_C.cast<double>());
     if (!pixel || !camera.sees(*pixel, 0)) continue;
     const auto at = static_cast<std::size_t>(static_cast<int>(pixel->y()) / cell * columns_ + static_cast<int>(pixel->x()) / cell);

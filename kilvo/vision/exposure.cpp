@@ -35,7 +35,7 @@ std::optional<Brightness> PhotometricModel::exposure_at(const State& x) const {
   const SE3 T_CW = T_CI_ * x.pose().inverse();
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     const Prepared& p = prepared_[i];
-    const auto view = view_of(camera_, T_CI_, x.pose(), p.p_W);
+    const auto view = begins_at(x) ? p.first_view : view_of(camera_, T_CI_, x.pose(), p.p_W);
     if (!p.patch || !view || !camera_.sees(view->pixel, border * (1 << level_))) continue;
     Values seen;
     sample_patch(pyramid_[static_cast<std::size_t>(level_)], at_level(view->pixel, level_).cast<float>(), seen);

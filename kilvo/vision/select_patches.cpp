@@ -69,6 +69,59 @@ bool choose_observation(const View& view, const VisualPoint& p, PatchCandidate& 
   return warp.has_value();
 }
 
+// A point that the image should show, and what it promises.
+struct Candidate {
+  std::uint32_t point, next;  // next: of its cell, of those found before
+  Eigen::Vector2d pixel;
+  double depth, worth;
+};
+constexpr std::uint32_t none = 0xffffffff;
+
+// Points of a map that lie in an image, by its cells.
+struct Candidates {
+  std::vector<Candidate> all;
+  std::vector<std::uint32_t> newest;  // by cell
+
+  Candidates(const View& view, const DepthView& depth, const CellGrid& grid) : newest(grid.size(), none) {
+    for (const VoxelKey key : voxels_in_view(view.map, depth)) {
+      view.map.visit(key, [&](std::uint32_t id, const VisualPoint& p) {
+        const Eigen::Vector3d p_C = view.T_CW * p.p_W;
+        const auto pixel = view.camera.project(p_C);
+        if (!pixel || !view.camera.sees(*pixel, selected_border)) return;
+        // Those that have proven themselves first.
+        const double worth = static_cast<double>(p.corner) * (1.0 + std::min<int>(p.seen, 10)) / (1.0 + p.failed);
+        std::uint32_t& before = newest[grid.of(*pixel)];
+        all.push_back({id, before, *pixel, p_C.z(), worth});
+        before = static_cast<std::uint32_t>(all.size() - 1);
+      });
+    }
+  }
+
+  // The most promising of a cell that has not been refused, the first found of equal ones.
+  Candidate* best_of(std::size_t cell) {
+    Candidate* best = nullptr;
+    for (std::uint32_t i = newest[cell]; i != none; i = all[i].next) {
+      if (all[i].worth > 0 && (best == nullptr || all[i].worth >= best->worth)) best = &all[i];
+    }
+    return best;
+  }
+};
+
+// What is to be looked at, if it can be.
+std::optional<PatchCandidate> track_of(const View& view, const DepthView& depth, const VisionConfig& config, const Candidate& candidate) {
+  const VisualPoint& p = view.map.point(candidate.point);
+  const Eigen::Vector3d n = p.normal_W.cast<double>();
+  const Eigen::Vector3d towards = view.eye_W - p.p_W;
+  const double facing = n.dot(towards);
+  if (std::abs(facing) < grazing * towards.norm()) return std::nullopt;
+  if (depth.hides(candidate.pixel, p.p_W, facing > 0 ? n : Eigen::Vector3d(-n), candidate.depth)) return std::nullopt;
+  PatchCandidate track;
+  track.point = candidate.point;
+  track.plain = static_cast<double>(p.corner) < config.min_corner;
+  track.pixel = candidate.pixel;
+  return choose_observation(view, p, track) ? std::optional(track) : std::nullopt;
+}
+
 }  // namespace
 
 std::optional<PlaneWarp> warp_between(const Camera& camera, const SE3& T_CW, const SE3& T_RW, const Eigen::Vector3d& p_W,
@@ -99,36 +152,17 @@ std::vector<PatchCandidate> select_patches(const VisualMap& map, const Camera& c
                                            const VisionConfig& config) {
   const View view{map, camera, T_CW, T_CW.inverse().p};
   const CellGrid grid(camera, config.cell);
-  struct Best {
-    double worth = 0;
-    PatchCandidate track;
-  };
-  std::vector<Best> cells(grid.size());
-  for (const VoxelKey key : voxels_in_view(map, depth)) {
-    map.visit(key, [&](std::uint32_t id, const VisualPoint& p) {
-      const Eigen::Vector3d p_C = T_CW * p.p_W;
-      const auto pixel = camera.project(p_C);
-      if (!pixel || !camera.sees(*pixel, selected_border)) return;
-      Best& best = cells[grid.of(*pixel)];
-      // Those that have proven themselves first.
-      const double worth = static_cast<double>(p.corner) * (1.0 + std::min<int>(p.seen, 10)) / (1.0 + p.failed);
-      if (worth <= best.worth) return;
-      const Eigen::Vector3d n = p.normal_W.cast<double>();
-      const Eigen::Vector3d towards = view.eye_W - p.p_W;
-      const double facing = n.dot(towards);
-      if (std::abs(facing) < grazing * towards.norm()) return;
-      if (depth.hides(*pixel, p.p_W, facing > 0 ? n : Eigen::Vector3d(-n), p_C.z())) return;
-      // A point without a usable view would keep others out of its cell for ever.
-      PatchCandidate track;
-      track.point = id;
-      track.plain = static_cast<double>(p.corner) < config.min_corner;
-      track.pixel = *pixel;
-      if (choose_observation(view, p, track)) best = {worth, track};
-    });
-  }
+  Candidates candidates(view, depth, grid);
   std::vector<PatchCandidate> tracks;
-  for (const Best& best : cells) {
-    if (best.worth > 0) tracks.push_back(best.track);
+  for (std::size_t cell = 0; cell < grid.size(); ++cell) {
+    // A point without a usable view must not keep others out of its cell.
+    while (Candidate* best = candidates.best_of(cell)) {
+      if (const auto track = track_of(view, depth, config, *best)) {
+        tracks.push_back(*track);
+        break;
+      }
+      best->worth = 0;
+    }
   }
   const std::size_t corners = tracks.size() - static_cast<std::size_t>(std::ranges::count_if(tracks, &PatchCandidate::plain));
   if (corners >= plenty_of_corners) std::erase_if(tracks, [](const PatchCandidate& t) { return t.plain; });
