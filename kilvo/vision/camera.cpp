@@ -136,17 +136,15 @@ Camera::Camera(const CameraMount& mount)
 
 Camera::Window Camera::find_window() const {
   Window window;
-  const double w = width_ - 1, h = height_ - 1;
   constexpr int steps = 16;
   for (int k = 0; k <= steps; ++k) {
-    const double s = static_cast<double>(k) / steps;
-    for (const Eigen::Vector2d& pixel :
-         {Eigen::Vector2d(s * w, 0), Eigen::Vector2d(s * w, h), Eigen::Vector2d(0, s * h), Eigen::Vector2d(w, s * h)}) {
+    const double u = (width_ - 1) * static_cast<double>(k) / steps, v = (height_ - 1) * static_cast<double>(k) / steps;
+    for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(u, 0), {u, height_ - 1}, {0, v}, {width_ - 1, v}}) {
       const auto ray = unproject(pixel);
       constexpr float all = 1e6F;  // it sees up to a limit of its own: project() decides
       if (!ray) return {-all, all, -all, all};
-      const auto x = static_cast<float>(ray->x()), y = static_cast<float>(ray->y());
-      window = {std::min(window.left, x), std::max(window.right, x), std::min(window.top, y), std::max(window.bottom, y)};
+      const Eigen::Vector2f r = ray->head<2>().cast<float>();
+      window = {std::min(window.left, r.x()), std::max(window.right, r.x()), std::min(window.top, r.y()), std::max(window.bottom, r.y())};
     }
   }
   return window;

@@ -57,22 +57,18 @@ void DepthView::find_fronts() {
   }
 }
 
-template <class F>
-bool DepthView::any_around(const Eigen::Vector2d& pixel, F&& f) const {
+bool DepthView::hides(const Eigen::Vector2d& pixel, const Eigen::Vector3d& p_W, const Eigen::Vector3d& n_W, double depth) const {
+  if (static_cast<double>(front(pixel.cast<float>())) >= depth) return false;
+  const double limit = in_front_least + in_front_share * depth;
   const int x = static_cast<int>(pixel.x()) / cell, y = static_cast<int>(pixel.y()) / cell;
   for (int j = std::max(0, y - 1); j <= std::min(rows_ - 1, y + 1); ++j) {
     for (int i = std::max(0, x - 1); i <= std::min(columns_ - 1, x + 1); ++i) {
       const std::uint32_t nearest = nearest_[static_cast<std::size_t>(j * columns_ + i)];
-      if (nearest != none && f(seen_[nearest])) return true;
+      if (nearest == none || static_cast<double>(seen_[nearest].depth) >= depth) continue;
+      if (n_W.dot(point(seen_[nearest]) - p_W) > limit) return true;
     }
   }
   return false;
-}
-
-bool DepthView::hides(const Eigen::Vector2d& pixel, const Eigen::Vector3d& p_W, const Eigen::Vector3d& n_W, double depth) const {
-  if (static_cast<double>(front(pixel.cast<float>())) >= depth) return false;
-  const double limit = in_front_least + in_front_share * depth;
-  return any_around(pixel, [&](const Seen& s) { return static_cast<double>(s.depth) < depth && n_W.dot(point(s) - p_W) > limit; });
 }
 
 bool DepthView::shows(const Seen& s) const {

@@ -95,7 +95,7 @@ class PhotometricModel {
     bool valid = false;
   };
   std::pair<Values, double> as_first_seen(std::size_t i, const SE3& T_CW) const;  // a patch and its inverse exposure
-  bool begins_at(const State& x) const { return x.p == first_.p && x.R.matrix() == first_.R.matrix(); }
+  bool begins_at(const State& x) const { return x.p == at_.prior.p && x.R.matrix() == at_.prior.R.matrix(); }
   void prepare(int level);
   Part evaluate(std::size_t i, const State& x);
   /// Where a patch is found: how far from where it is seen, and how surely, by itself.
@@ -111,8 +111,9 @@ class PhotometricModel {
 
   const VisualMap& map_;
   const Camera& camera_;
-  SE3 T_CI_;
-  SE3 first_;  // the prior's pose
+  struct {
+    SE3 T_CI, prior;  // the prior's pose
+  } at_;
   std::span<const GreyImage> pyramid_;
   std::span<const PatchCandidate> tracks_;
   VisionConfig config_;

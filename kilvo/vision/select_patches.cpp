@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace kilvo {
 namespace {
@@ -71,47 +72,16 @@ bool choose_observation(const View& view, const VisualPoint& p, PatchCandidate& 
 
 // A point that the image should show, and what it promises.
 struct Candidate {
-  std::uint32_t point, next;  // next: of its cell, of those found before
+  std::size_t cell;
+  double worth, depth;
+  std::uint32_t point;
   Eigen::Vector2d pixel;
-  double depth, worth;
-};
-constexpr std::uint32_t none = 0xffffffff;
-
-// Points of a map that lie in an image, by its cells.
-struct Candidates {
-  std::vector<Candidate> all;
-  std::vector<std::uint32_t> newest;  // by cell
-
-  Candidates(const View& view, const DepthView& depth, const CellGrid& grid) : newest(grid.size(), none) {
-    for (const VoxelKey key : voxels_in_view(view.map, depth)) {
-      view.map.visit(key, [&](std::uint32_t id, const VisualPoint& p) {
-        const Eigen::Vector3d p_C = view.T_CW * p.p_W;
-        const auto pixel = view.camera.project(p_C);
-        if (!pixel || !view.camera.sees(*pixel, selected_border)) return;
-        // Those that have proven themselves first.
-        const double worth = static_cast<double>(p.corner) * (1.0 + std::min<int>(p.seen, 10)) / (1.0 + p.failed);
-        std::uint32_t& before = newest[grid.of(*pixel)];
-        all.push_back({id, before, *pixel, p_C.z(), worth});
-        before = static_cast<std::uint32_t>(all.size() - 1);
-      });
-    }
-  }
-
-  // The most promising of a cell that has not been refused, the first found of equal ones.
-  Candidate* best_of(std::size_t cell) {
-    Candidate* best = nullptr;
-    for (std::uint32_t i = newest[cell]; i != none; i = all[i].next) {
-      if (all[i].worth > 0 && (best == nullptr || all[i].worth >= best->worth)) best = &all[i];
-    }
-    return best;
-  }
 };
 
 // What is to be looked at, if it can be.
 std::optional<PatchCandidate> track_of(const View& view, const DepthView& depth, const VisionConfig& config, const Candidate& candidate) {
   const VisualPoint& p = view.map.point(candidate.point);
-  const Eigen::Vector3d n = p.normal_W.cast<double>();
-  const Eigen::Vector3d towards = view.eye_W - p.p_W;
+  const Eigen::Vector3d n = p.normal_W.cast<double>(), towards = view.eye_W - p.p_W;
   const double facing = n.dot(towards);
   if (std::abs(facing) < grazing * towards.norm()) return std::nullopt;
   if (depth.hides(candidate.pixel, p.p_W, facing > 0 ? n : Eigen::Vector3d(-n), candidate.depth)) return std::nullopt;
@@ -152,17 +122,28 @@ std::vector<PatchCandidate> select_patches(const VisualMap& map, const Camera& c
                                            const VisionConfig& config) {
   const View view{map, camera, T_CW, T_CW.inverse().p};
   const CellGrid grid(camera, config.cell);
-  Candidates candidates(view, depth, grid);
+  std::vector<Candidate> candidates;
+  for (const VoxelKey key : voxels_in_view(map, depth)) {
+    map.visit(key, [&](std::uint32_t id, const VisualPoint& p) {
+      const Eigen::Vector3d p_C = T_CW * p.p_W;
+      const auto pixel = camera.project(p_C);
+      if (!pixel || !camera.sees(*pixel, selected_border)) return;
+      // Those that have proven themselves first.
+      const double worth = static_cast<double>(p.corner) * (1.0 + std::min<int>(p.seen, 10)) / (1.0 + p.failed);
+      for (std::size_t k = 0; k < p.count; ++k) __builtin_prefetch(&map.observation(p.observations[k]));
+      if (worth > 0) candidates.push_back({grid.of(*pixel), worth, p_C.z(), id, *pixel});
+    });
+  }
+  std::ranges::stable_sort(candidates, {}, [](const Candidate& c) { return std::pair(c.cell, -c.worth); });
   std::vector<PatchCandidate> tracks;
-  for (std::size_t cell = 0; cell < grid.size(); ++cell) {
+  std::size_t taken = grid.size();
+  for (const Candidate& candidate : candidates) {
+    if (candidate.cell == taken) continue;
     // A point without a usable view must not keep others out of its cell.
-    while (Candidate* best = candidates.best_of(cell)) {
-      if (const auto track = track_of(view, depth, config, *best)) {
-        tracks.push_back(*track);
-        break;
-      }
-      best->worth = 0;
-    }
+    const auto track = track_of(view, depth, config, candidate);
+    if (!track) continue;
+    tracks.push_back(*track);
+    taken = candidate.cell;
   }
   const std::size_t corners = tracks.size() - static_cast<std::size_t>(std::ranges::count_if(tracks, &PatchCandidate::plain));
   if (corners >= plenty_of_corners) std::erase_if(tracks, [](const PatchCandidate& t) { return t.plain; });
