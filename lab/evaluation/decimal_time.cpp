@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <iterator>
 #include <limits>
 
 namespace kilvo::lab {
@@ -44,14 +43,15 @@ std::optional<int> take_exponent(std::string_view& s) {
 /// A number of units of the last of so many decimals.
 void append_decimals(std::string& out, std::int64_t n, int decimals) {
   char buffer[32];
-  // Zeros before it, so that there is a digit before the point.
-  char* const digits = std::fill_n(buffer, decimals + 1, '0');
-  const auto size = n < 0 ? std::uint64_t{0} - static_cast<std::uint64_t>(n) : static_cast<std::uint64_t>(n);
-  const char* const end = std::to_chars(digits, std::end(buffer), size).ptr;
-  const char* const point = end - decimals;
-  if (n < 0) out += '-';
-  out.append(std::min<const char*>(digits, point - 1), point);
-  out.append(1, '.').append(point, end);
+  char* p = buffer + sizeof(buffer);
+  auto rest = n < 0 ? std::uint64_t{0} - static_cast<std::uint64_t>(n) : static_cast<std::uint64_t>(n);
+  for (int i = 0; i <= decimals || rest > 0; ++i) {
+    if (i == decimals) *--p = '.';
+    *--p = static_cast<char>('0' + rest % 10);
+    rest /= 10;
+  }
+  if (n < 0) *--p = '-';
+  out.append(p, buffer + sizeof(buffer));
 }
 
 }  // namespace
