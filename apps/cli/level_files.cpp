@@ -15,8 +15,16 @@ void LevelFiles::hold(const Output& output, HeldOutput::Part part) {
   for (const Event& event : output.events) {
     if (event.reason == Reason::levelled) event_ = event;
   }
+  const bool may_write = !gravity_align_ || turn_;
+  const bool is_as_written = !turn_ || (output.R_LW && output.R_LW->matrix() == turn_->matrix());
+  if (may_write && is_as_written && waiting_.empty()) return write(output, part);
   waiting_.emplace_back(output, part);
-  if (!gravity_align_ || turn_) write_waiting();
+  if (may_write) write_waiting();
+}
+
+void LevelFiles::write(const Output& output, HeldOutput::Part part) {
+  if (part != HeldOutput::Part::sweep) files_.write_state(output);
+  if (part != HeldOutput::Part::state) files_.write_sweep(output);
 }
 
 void LevelFiles::finish() {
@@ -37,8 +45,7 @@ void LevelFiles::write_waiting() {
     } else if (turn_ && output.R_LW->matrix() != turn_->matrix()) {
       Levelling::apply(*turn_ * output.R_LW->inverse(), output);
     }
-    if (held.part() != HeldOutput::Part::sweep) files_.write_state(output);
-    if (held.part() != HeldOutput::Part::state) files_.write_sweep(output);
+    write(output, held.part());
   }
   waiting_.clear();
 }

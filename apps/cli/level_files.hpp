@@ -28,6 +28,7 @@ class LevelFiles {
   const std::optional<Event>& event() const { return event_; }
 
  private:
+  void write(const Output& output, HeldOutput::Part part);
   void write_waiting();
 
   ResultFiles& files_;

@@ -131,6 +131,23 @@ Camera::Camera(const CameraMount& mount)
   const double end = fisheye_ ? std::numbers::pi / 2 : widest_radius;
   const std::vector<double> turns = roots_of(growth_of(k_, fisheye_), end);
   largest_ = turns.empty() ? end : turns.front();
+  window_ = find_window();
+}
+
+Camera::Window Camera::find_window() const {
+  Window window;
+  constexpr int steps = 16;
+  for (int k = 0; k <= steps; ++k) {
+    const double u = (width_ - 1) * static_cast<double>(k) / steps, v = (height_ - 1) * static_cast<double>(k) / steps;
+    for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(u, 0), {u, height_ - 1}, {0, v}, {width_ - 1, v}}) {
+      const auto ray = unproject(pixel);
+      constexpr float all = 1e6F;  // it sees up to a limit of its own: project() decides
+      if (!ray) return {-all, all, -all, all};
+      const Eigen::Vector2f r = ray->head<2>().cast<float>();
+      window = {std::min(window.left, r.x()), std::max(window.right, r.x()), std::min(window.top, r.y()), std::max(window.bottom, r.y())};
+    }
+  }
+  return window;
 }
 
 std::optional<Eigen::Vector2d> Camera::project(const Eigen::Vector3d& p_C) const {

@@ -11,37 +11,9 @@ constexpr double in_front_share = 0.02, in_front_least = 0.08;  // of the depth;
 // Nearer than this the camera sees blur and the robot itself.
 constexpr float least_depth = 0.2F;  // m
 
-// Bounds of x/z and y/z that the image can hold, so that most points need no distortion.
-struct Window {
-  float left = 0, right = 0, top = 0, bottom = 0;
-
-  void take(const Eigen::Vector3d& ray) {
-    const Eigen::Vector3f r = ray.cast<float>();
-    left = std::min(left, r.x());
-    right = std::max(right, r.x());
-    top = std::min(top, r.y());
-    bottom = std::max(bottom, r.y());
-  }
-  bool holds(const Eigen::Vector3f& p) const {
-    return p.x() >= left * p.z() && p.x() <= right * p.z() && p.y() >= top * p.z() && p.y() <= bottom * p.z();
-  }
-};
-
-Window window_of(const Camera& camera) {
-  Window window;
-  const double w = camera.width() - 1, h = camera.height() - 1;
-  constexpr int steps = 16;
-  for (int k = 0; k <= steps; ++k) {
-    const double s = static_cast<double>(k) / steps;
-    for (const Eigen::Vector2d& pixel :
-         {Eigen::Vector2d(s * w, 0), Eigen::Vector2d(s * w, h), Eigen::Vector2d(0, s * h), Eigen::Vector2d(w, s * h)}) {
-      const auto ray = camera.unproject(pixel);
-      constexpr float all = 1e6F;  // it sees up to a limit of its own: project() decides
-      if (!ray) return {-all, all, -all, all};
-      window.take(*ray);
-    }
-  }
-  return window;
+// False: the image cannot show it. So most points need no distortion.
+bool may_hold(const Camera::Window& window, const Eigen::Vector3f& p) {
+  return p.x() >= window.left * p.z() && p.x() <= window.right * p.z() && p.y() >= window.top * p.z() && p.y() <= window.bottom * p.z();
 }
 
 }  // namespace
@@ -51,12 +23,11 @@ DepthView::DepthView(const Camera& camera, const SE3& T_CW, std::span<const Eige
       columns_(camera.width() / cell + 1),
       rows_(camera.height() / cell + 1),
       nearest_(static_cast<std::size_t>(columns_ * rows_), none) {
-  const Window window = window_of(camera);
   const Eigen::Matrix3f R = T_CW.R.matrix().cast<float>();
   const Eigen::Vector3f t = T_CW.p.cast<float>();
   for (std::uint32_t i = 0; i < points_W.size(); ++i) {
     const Eigen::Vector3f p_C = R * points_W[i].head<3>() + t;
-    if (p_C.z() < least_depth || !window.holds(p_C)) continue;
+    if (p_C.z() < least_depth || !may_hold(camera.window(), p_C)) continue;
     const auto pixel = camera.project(p_C.cast<double>());
     if (!pixel || !camera.sees(*pixel, 0)) continue;
     const auto at = static_cast<std::size_t>(static_cast<int>(pixel->y()) / cell * columns_ + static_cast<int>(pixel->x()) / cell);
@@ -86,22 +57,18 @@ void DepthView::find_fronts() {
   }
 }
 
-template <class F>
-bool DepthView::any_around(const Eigen::Vector2d& pixel, F&& f) const {
+bool DepthView::hides(const Eigen::Vector2d& pixel, const Eigen::Vector3d& p_W, const Eigen::Vector3d& n_W, double depth) const {
+  if (static_cast<double>(front(pixel.cast<float>())) >= depth) return false;
+  const double limit = in_front_least + in_front_share * depth;
   const int x = static_cast<int>(pixel.x()) / cell, y = static_cast<int>(pixel.y()) / cell;
   for (int j = std::max(0, y - 1); j <= std::min(rows_ - 1, y + 1); ++j) {
     for (int i = std::max(0, x - 1); i <= std::min(columns_ - 1, x + 1); ++i) {
       const std::uint32_t nearest = nearest_[static_cast<std::size_t>(j * columns_ + i)];
-      if (nearest != none && f(seen_[nearest])) return true;
+      if (nearest == none || static_cast<double>(seen_[nearest].depth) >= depth) continue;
+      if (n_W.dot(point(seen_[nearest]) - p_W) > limit) return true;
     }
   }
   return false;
-}
-
-bool DepthView::hides(const Eigen::Vector2d& pixel, const Eigen::Vector3d& p_W, const Eigen::Vector3d& n_W, double depth) const {
-  if (static_cast<double>(front(pixel.cast<float>())) >= depth) return false;
-  const double limit = in_front_least + in_front_share * depth;
-  return any_around(pixel, [&](const Seen& s) { return static_cast<double>(s.depth) < depth && n_W.dot(point(s) - p_W) > limit; });
 }
 
 bool DepthView::shows(const Seen& s) const {

@@ -35,8 +35,6 @@ class DepthView {
  private:
   static constexpr int cell = 8;  // px
   static constexpr std::uint32_t none = 0xffffffff;
-  template <class F>
-  bool any_around(const Eigen::Vector2d& pixel, F&& f) const;
   void find_fronts();
   float front(const Eigen::Vector2f& pixel) const {
     return fronts_[static_cast<std::size_t>(static_cast<int>(pixel.y()) / cell * columns_ + static_cast<int>(pixel.x()) / cell)];

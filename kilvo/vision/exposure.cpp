@@ -4,12 +4,6 @@
 #include "kilvo/vision/photometric.hpp"
 
 namespace kilvo {
-namespace {
-
-// Pixels a patch needs around it at its level.
-constexpr double border = 10;
-
-}  // namespace
 
 // What was seen first has passed through the fewest estimates of the exposure.
 std::pair<Values, double> PhotometricModel::as_first_seen(std::size_t i, const SE3& T_CW) const {
@@ -25,6 +19,7 @@ std::pair<Values, double> PhotometricModel::as_first_seen(std::size_t i, const S
 }
 
 std::optional<Brightness> PhotometricModel::exposure_at(const State& x) const {
+  constexpr double border = 10;  // pixels a patch needs around it at its level
   struct Compared {
     double log;
     float top;   // of the patch
@@ -32,10 +27,10 @@ std::optional<Brightness> PhotometricModel::exposure_at(const State& x) const {
     bool is_plain;
   };
   std::vector<Compared> compared;
-  const SE3 T_CW = T_CI_ * x.pose().inverse();
+  const SE3 T_CW = at_.T_CI * x.pose().inverse();
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     const Prepared& p = prepared_[i];
-    const auto view = view_of(camera_, T_CI_, x.pose(), p.p_W);
+    const auto view = begins_at(x) ? p.first_view : view_of(camera_, at_.T_CI, x.pose(), p.p_W);
     if (!p.patch || !view || !camera_.sees(view->pixel, border * (1 << level_))) continue;
     Values seen;
     sample_patch(pyramid_[static_cast<std::size_t>(level_)], at_level(view->pixel, level_).cast<float>(), seen);

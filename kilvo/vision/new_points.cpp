@@ -14,27 +14,6 @@ constexpr double new_point_border = 20;
 // Surfaces seen at a flatter angle than this (its sine) are no use.
 constexpr double grazing_new = 0.2;
 
-}  // namespace
-
-bool project_to_plane(const VoxelMap& map, const Eigen::Vector3d& eye_W, VisualPoint& point) {
-  constexpr double near = 0.15;  // m
-  const Eigen::Vector3d ray = point.p_W - eye_W;
-  return map.visit_planes(point.p_W, [&](const VoxelMap::Match& match) {
-    const Eigen::Vector3d n = match.plane->normal.cast<double>();
-    const double slope = n.dot(ray);
-    if (std::abs(slope) < grazing_new * ray.norm()) return false;
-    const Eigen::Vector3d on_plane = eye_W + ray * (n.dot(match.plane->centre - eye_W) / slope);
-    if ((on_plane - point.p_W).norm() > near) return false;
-    point.p_W = on_plane;
-    point.normal_W = match.plane->normal;
-    point.variance = static_cast<float>(match.plane->variance_at(on_plane)) + match.plane->roughness_variance;
-    point.node = match.node;
-    return true;
-  });
-}
-
-namespace {
-
 // Looks for new points of one image.
 struct Search {
   const VoxelMap& map;
@@ -101,6 +80,23 @@ void add_plain(const Search& search, int block, std::span<const PatchCandidate> 
 }
 
 }  // namespace
+
+bool project_to_plane(const VoxelMap& map, const Eigen::Vector3d& eye_W, VisualPoint& point) {
+  constexpr double near = 0.15;  // m
+  const Eigen::Vector3d ray = point.p_W - eye_W;
+  return map.visit_planes(point.p_W, [&](const VoxelMap::Match& match) {
+    const Eigen::Vector3d n = match.plane->normal.cast<double>();
+    const double slope = n.dot(ray);
+    if (std::abs(slope) < grazing_new * ray.norm()) return false;
+    const Eigen::Vector3d on_plane = eye_W + ray * (n.dot(match.plane->centre - eye_W) / slope);
+    if ((on_plane - point.p_W).norm() > near) return false;
+    point.p_W = on_plane;
+    point.normal_W = match.plane->normal;
+    point.variance = static_cast<float>(match.plane->variance_at(on_plane)) + match.plane->roughness_variance;
+    point.node = match.node;
+    return true;
+  });
+}
 
 std::vector<NewPoint> new_points(const VoxelMap& map, const Camera& camera, const SE3& T_CW, const GreyImage& image, const DepthView& depth,
                                  std::span<const PatchCandidate> tracks, const VisionConfig& config) {

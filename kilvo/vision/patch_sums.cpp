@@ -56,8 +56,7 @@ PatchSums sums_of(const Template& patch, const Values& image, double tau, double
   const auto t = static_cast<float>(tau), tp = static_cast<float>(tau_patch);
   // The gradient is the patch's, so that it stays the same from iterate to iterate. The exposure is known by the patch's mean alone: by its
   // contrast, noise that is in the patch and in r would make each generation of patches look a little darker than the last.
-  const Sums sums = sum_up(patch, image, t, tp);
-  const auto& [xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top, top_seen] = sums;
+  const auto [xx, xy, yy, sx, sy, xr, yr, sr, rr, sum, top, top_seen] = sum_up(patch, image, t, tp);
   constexpr double n = Template::count;
   PatchSums out;
   out.saturated = top > bright || top * tp / t > expected_bright || top_seen > seen_bright;

@@ -88,7 +88,7 @@ std::optional<Patch> cut_patch(std::span<const GreyImage> pyramid, const Eigen::
   return patch;
 }
 
-float corner_of(const GreyImage& image, int x, int y) {
+KILVO_WIDE float corner_of(const GreyImage& image, int x, int y) {
   constexpr int reach = 4;
   if (x < reach + 1 || y < reach + 1 || x + reach + 1 >= image.width || y + reach + 1 >= image.height) return 0;
   int xx = 0, xy = 0, yy = 0;

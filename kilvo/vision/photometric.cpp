@@ -49,7 +49,7 @@ PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, c
                                    std::span<const PatchCandidate> tracks, const Estimate& prior, const VisionConfig& config)
     : map_(map),
       camera_(camera),
-      T_CI_(T_CI),
+      at_{T_CI, prior.x.pose()},
       pyramid_(pyramid),
       tracks_(tracks),
       config_(config),
@@ -72,7 +72,8 @@ PhotometricModel::PhotometricModel(const VisualMap& map, const Camera& camera, c
     p.depth_variance = static_cast<double>(point.variance) * patches_of_node[point.node];
     const Eigen::Vector3d ray = point.p_W + frame.T_CW.R.inverse() * frame.T_CW.p;
     p.slide_W = ray / point.normal_W.cast<double>().dot(ray);
-    if (const auto view = view_of(camera, T_CI, prior.x.pose(), p.p_W)) spread2.push_back((view->J * P * view->J.transpose()).trace());
+    p.first_view = view_of(camera, T_CI, at_.prior, p.p_W);
+    if (p.first_view) spread2.push_back((p.first_view->J * P * p.first_view->J.transpose()).trace());
   }
   const double spread = spread2.empty() ? 0 : std::sqrt(median_of(std::move(spread2)));
   int coarsest = 0;
@@ -94,7 +95,7 @@ PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x)
   Verdict& verdict = verdicts_[i];
   verdict = {};
   if (!p.patch || p.plain) return out;
-  const auto view = view_of(camera_, T_CI_, x.pose(), p.p_W);
+  const auto view = begins_at(x) ? p.first_view : view_of(camera_, at_.T_CI, x.pose(), p.p_W);
   if (!view) return out;
   const GreyImage& image = pyramid_[static_cast<std::size_t>(level_)];
   const Eigen::Vector2d at = at_level(view->pixel, level_);

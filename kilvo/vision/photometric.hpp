@@ -82,7 +82,8 @@ class PhotometricModel {
     double depth_variance = 0;                          // of the surface, shared by all patches on it
     double tau = 1;                                     // of the observation's frame
     std::uint32_t frame = 0;
-    bool plain = false;  // of use for the exposure alone
+    bool plain = false;                   // of use for the exposure alone
+    std::optional<PatchView> first_view;  // from the prior's pose
     std::optional<Template> patch;
   };
   struct Part {
@@ -94,6 +95,7 @@ class PhotometricModel {
     bool valid = false;
   };
   std::pair<Values, double> as_first_seen(std::size_t i, const SE3& T_CW) const;  // a patch and its inverse exposure
+  bool begins_at(const State& x) const { return x.p == at_.prior.p && x.R.matrix() == at_.prior.R.matrix(); }
   void prepare(int level);
   Part evaluate(std::size_t i, const State& x);
   /// Where a patch is found: how far from where it is seen, and how surely, by itself.
@@ -109,7 +111,9 @@ class PhotometricModel {
 
   const VisualMap& map_;
   const Camera& camera_;
-  SE3 T_CI_;
+  struct {
+    SE3 T_CI, prior;  // the prior's pose
+  } at_;
   std::span<const GreyImage> pyramid_;
   std::span<const PatchCandidate> tracks_;
   VisionConfig config_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace kilvo {
 namespace {
@@ -69,6 +70,28 @@ bool choose_observation(const View& view, const VisualPoint& p, PatchCandidate& 
   return warp.has_value();
 }
 
+// A point that the image should show, and what it promises.
+struct Candidate {
+  std::size_t cell;
+  double worth, depth;
+  std::uint32_t point;
+  Eigen::Vector2d pixel;
+};
+
+// What is to be looked at, if it can be.
+std::optional<PatchCandidate> track_of(const View& view, const DepthView& depth, const VisionConfig& config, const Candidate& candidate) {
+  const VisualPoint& p = view.map.point(candidate.point);
+  const Eigen::Vector3d n = p.normal_W.cast<double>(), towards = view.eye_W - p.p_W;
+  const double facing = n.dot(towards);
+  if (std::abs(facing) < grazing * towards.norm()) return std::nullopt;
+  if (depth.hides(candidate.pixel, p.p_W, facing > 0 ? n : Eigen::Vector3d(-n), candidate.depth)) return std::nullopt;
+  PatchCandidate track;
+  track.point = candidate.point;
+  track.plain = static_cast<double>(p.corner) < config.min_corner;
+  track.pixel = candidate.pixel;
+  return choose_observation(view, p, track) ? std::optional(track) : std::nullopt;
+}
+
 }  // namespace
 
 std::optional<PlaneWarp> warp_between(const Camera& camera, const SE3& T_CW, const SE3& T_RW, const Eigen::Vector3d& p_W,
@@ -99,36 +122,28 @@ std::vector<PatchCandidate> select_patches(const VisualMap& map, const Camera& c
                                            const VisionConfig& config) {
   const View view{map, camera, T_CW, T_CW.inverse().p};
   const CellGrid grid(camera, config.cell);
-  struct Best {
-    double worth = 0;
-    PatchCandidate track;
-  };
-  std::vector<Best> cells(grid.size());
+  std::vector<Candidate> candidates;
   for (const VoxelKey key : voxels_in_view(map, depth)) {
     map.visit(key, [&](std::uint32_t id, const VisualPoint& p) {
       const Eigen::Vector3d p_C = T_CW * p.p_W;
       const auto pixel = camera.project(p_C);
       if (!pixel || !camera.sees(*pixel, selected_border)) return;
-      Best& best = cells[grid.of(*pixel)];
       // Those that have proven themselves first.
       const double worth = static_cast<double>(p.corner) * (1.0 + std::min<int>(p.seen, 10)) / (1.0 + p.failed);
-      if (worth <= best.worth) return;
-      const Eigen::Vector3d n = p.normal_W.cast<double>();
-      const Eigen::Vector3d towards = view.eye_W - p.p_W;
-      const double facing = n.dot(towards);
-      if (std::abs(facing) < grazing * towards.norm()) return;
-      if (depth.hides(*pixel, p.p_W, facing > 0 ? n : Eigen::Vector3d(-n), p_C.z())) return;
-      // A point without a usable view would keep others out of its cell for ever.
-      PatchCandidate track;
-      track.point = id;
-      track.plain = static_cast<double>(p.corner) < config.min_corner;
-      track.pixel = *pixel;
-      if (choose_observation(view, p, track)) best = {worth, track};
+      for (std::size_t k = 0; k < p.count; ++k) __builtin_prefetch(&map.observation(p.observations[k]));
+      if (worth > 0) candidates.push_back({grid.of(*pixel), worth, p_C.z(), id, *pixel});
     });
   }
+  std::ranges::stable_sort(candidates, {}, [](const Candidate& c) { return std::pair(c.cell, -c.worth); });
   std::vector<PatchCandidate> tracks;
-  for (const Best& best : cells) {
-    if (best.worth > 0) tracks.push_back(best.track);
+  std::size_t taken = grid.size();
+  for (const Candidate& candidate : candidates) {
+    if (candidate.cell == taken) continue;
+    // A point without a usable view must not keep others out of its cell.
+    const auto track = track_of(view, depth, config, candidate);
+    if (!track) continue;
+    tracks.push_back(*track);
+    taken = candidate.cell;
   }
   const std::size_t corners = tracks.size() - static_cast<std::size_t>(std::ranges::count_if(tracks, &PatchCandidate::plain));
   if (corners >= plenty_of_corners) std::erase_if(tracks, [](const PatchCandidate& t) { return t.plain; });

@@ -21,6 +21,8 @@ constexpr std::uint16_t most_averaged = 32;
 constexpr float most_remembered = 64;  // as heavy as so many of the next colour; more would be lost in the rounding of the mean
 constexpr float least_weight = 1e-6F, most_weight = 1e6F;
 constexpr std::size_t block_size = 32;
+constexpr std::size_t full_known = 1 << 16;          // half a megabyte, which stays in a core's own cache
+constexpr std::uint64_t no_key = ~std::uint64_t{0};  // has 64 bits; keys have 63
 
 /// Spreads neighbouring voxels over all 64 bits (the finaliser of MurmurHash3).
 std::uint64_t hash(std::uint64_t key) {
@@ -71,7 +73,8 @@ MapBuilder::MapBuilder(const MappingConfig& config)
       keep_(config.keep),
       max_points_(static_cast<std::size_t>(std::max(0, config.max_points))),
       number_bits_(static_cast<unsigned>(std::bit_width(max_points_ + 1))),
-      tables_(table_count) {
+      tables_(table_count),
+      full_(full_known, no_key) {
   if (!(std::isfinite(resolution_) && resolution_ > 0)) throw std::invalid_argument("map.resolution must be a positive length in metres");
   for (Table& table : tables_) grow(table);
 }
@@ -87,15 +90,28 @@ void MapBuilder::add(std::span<const Eigen::Vector4f> points_W) {
   if (!keep_) return;
   Block block;
   for (std::size_t begin = 0; begin < points_W.size(); begin += block_size) {
-    const std::size_t size = std::min(block_size, points_W.size() - begin), count = locate(&points_W[begin], size, block);
+    const std::size_t size = std::min(block_size, points_W.size() - begin), located = locate(&points_W[begin], size, block);
+    const std::size_t count = leave_out_full(block, located);
     prefetch(block, count);
     const std::size_t grown = grown_;
     for (std::size_t i = 0; i < count; ++i) {
       const Table& table = tables_[block.hashes[i] % table_count];
       merge(block.samples[i], block.hashes[i], grown_ == grown ? block.places[i] : block.hashes[i] >> table.shift);
     }
-    dropped_ += size - count;
+    dropped_ += size - located;
   }
+}
+
+/// Most points of a walk fall where the mean is complete. How many are left.
+std::size_t MapBuilder::leave_out_full(Block& block, std::size_t count) const {
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (full_[block.hashes[i] % full_known] == block.samples[i].key) continue;
+    block.samples[left] = block.samples[i];
+    block.hashes[left] = block.hashes[i];
+    ++left;
+  }
+  return left;
 }
 
 /// The voxels that hold each of these points alone; how many, since for some there is none.
@@ -115,15 +131,17 @@ std::size_t MapBuilder::locate(const Eigen::Vector4f* points_W, std::size_t coun
     sample.intensity = points_W[i][3];
     block.hashes[located] = hash(sample.key);
     block.from[located] = static_cast<std::uint32_t>(i);
-    const Table& table = tables_[block.hashes[located] % table_count];
-    __builtin_prefetch(&table.slots[block.hashes[located] >> table.shift]);
     ++located;
   }
   return located;
 }
 
-/// Asks for the voxels that the tables seem to have for these.
+/// Asks for the tables' slots of these, and for the voxels that they seem to have there.
 void MapBuilder::prefetch(Block& block, std::size_t count) const {
+  for (std::size_t i = 0; i < count; ++i) {
+    const Table& table = tables_[block.hashes[i] % table_count];
+    __builtin_prefetch(&table.slots[block.hashes[i] >> table.shift]);
+  }
   for (std::size_t i = 0; i < count; ++i) {
     const Table& table = tables_[block.hashes[i] % table_count];
     const std::uint32_t tag = tag_of(block.hashes[i]);
@@ -148,7 +166,10 @@ void MapBuilder::merge(const Voxel& sample, std::uint64_t hashed, std::size_t fr
   const std::size_t place = slot_of(table, sample.key, hashed, from);
   if (table.slots[place] != 0) {
     Voxel& known = voxel((table.slots[place] & number_mask()) - 1);
-    if (known.count == most_averaged) return;
+    if (known.count == most_averaged) {
+      full_[hashed % full_known] = known.key;
+      return;
+    }
     ++known.count;
     const float share = 1.0F / static_cast<float>(known.count);
     for (int axis = 0; axis < 3; ++axis) known.position[axis] = moved(known.position[axis], sample.position[axis], share);
@@ -242,7 +263,8 @@ Eigen::Vector4f MapBuilder::point(std::size_t i) const {
 }
 
 std::size_t MapBuilder::memory_bytes() const {
-  std::size_t bytes = sizeof(*this) + chunks_.size() * chunk_size * sizeof(Voxel) + tables_.size() * sizeof(Table);
+  std::size_t bytes =
+      sizeof(*this) + chunks_.size() * chunk_size * sizeof(Voxel) + tables_.size() * sizeof(Table) + full_.size() * sizeof(std::uint64_t);
   for (const Table& table : tables_) bytes += table.slots.capacity() * sizeof(std::uint32_t);
   for (const auto& chunk : colours_) bytes += sizeof(chunk) + (chunk ? chunk_size * sizeof(Colour) : 0);
   return bytes;

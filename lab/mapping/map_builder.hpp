@@ -90,6 +90,7 @@ class MapBuilder {
   /// Points on their way, so many at a time that their cache misses overlap.
   struct Block;
   std::size_t locate(const Eigen::Vector4f* points_W, std::size_t count, Block& block) const;
+  std::size_t leave_out_full(Block& block, std::size_t count) const;
   void prefetch(Block& block, std::size_t count) const;
   std::uint32_t tag_of(std::uint64_t hashed) const { return static_cast<std::uint32_t>(hashed >> 8U << number_bits_); }
   std::uint32_t number_mask() const { return (std::uint32_t{1} << number_bits_) - 1; }
@@ -113,6 +114,7 @@ class MapBuilder {
   std::vector<std::unique_ptr<Voxel[]>> chunks_;    // never moved
   std::vector<std::unique_ptr<Colour[]>> colours_;  // of the chunks; null, or missing, where nothing has a colour
   std::vector<Table> tables_;                       // many small ones, grown one at a time
+  std::vector<std::uint64_t> full_;                 // by hash, the last key whose mean is complete: nothing changes there any more
 };
 
 }  // namespace kilvo::lab
