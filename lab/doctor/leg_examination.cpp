@@ -181,11 +181,12 @@ void Examination::examine_legs() {
     return;
   }
   if (!examine_leg_names()) return;
+  examine_joint_speeds();
   leg_turns_ = leg_turns(legs_under(nullptr), turn_interval);
   legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
   // A clock that is off first: any joint looks wrong at another time.
   leg_offset_ = legs_.known ? legs_.offset : 0;
-  if (find_leg_start() || try_leg_hypotheses() || try_standing_hypotheses()) {
+  if (find_leg_start() || try_leg_hypotheses() || try_standing_hypotheses() || try_acceleration_hypotheses()) {
     leg_turns_ = leg_turns(legs_under(nullptr), turn_interval);
     legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
   }
