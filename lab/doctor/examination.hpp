@@ -110,6 +110,8 @@ class Examination {
   LegAcceleration leg_acceleration(const LegHypothesis* hypothesis, const SO3& R_link_imu, double offset) const;
   bool try_acceleration_hypotheses();
   void examine_leg_size();
+  bool accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const;
+  void accuse_leg_shape();
   void examine_joint_speeds();
   // leg_mount.cpp
   MountFit measure_leg_mount() const;

@@ -85,6 +85,7 @@ void Examination::examine_joint_speeds() {
 
 // By acceleration alone, which soles that roll and joints that bend change by a few hundredths.
 void Examination::examine_leg_size() {
+  if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "leg_lengths"; })) return;
   const LegAcceleration& fit = leg_acceleration_;
   constexpr double worth_it = 0.5, tolerance = 0.05;  // of the acceleration, -
   if (!fit.good || fit.explained < worth_it) {

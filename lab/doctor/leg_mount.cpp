@@ -34,6 +34,26 @@ MountFit Examination::measure_leg_mount() const {
   return fit.fit.good ? fit : fit_from(described);
 }
 
+// The turning tells the mount to some degrees, whatever the lengths; the acceleration to half of one, if they are right.
+bool Examination::accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const {
+  const SO3 by_acceleration = R_link_imu.inverse() * SO3::Exp(leg_acceleration_.turn), described = robot_.imu.T_link_imu.R.inverse();
+  const double angle = (by_acceleration * described.inverse()).Log().norm();
+  if (degrees(angle) < leg_rotation_tolerance) return true;
+  return by_turning.fit.good && (by_acceleration * by_turning.R.inverse()).Log().norm() < 0.5 * angle;
+}
+
+void Examination::accuse_leg_shape() {
+  const double angle = leg_acceleration_.turn.norm();
+  Finding f{Sensor::legs, "leg_lengths", {}, {}, {}, std::sin(angle), {}, {}, true};
+  f.text =
+      fmt::format("the lengths of thigh and shin do not fit each other: by them the robot accelerates in a direction {:.1f} degrees off",
+                  degrees(angle));
+  f.evidence = fmt::format("the legs turn as the gyro does with the described mount; {:.0f} % of their acceleration is explained",
+                           100 * leg_acceleration_.explained);
+  f.remedy = "robot.urdf: the lengths of thigh and shin, or the URDF of this robot";
+  find(std::move(f));
+}
+
 void Examination::examine_leg_rotation() {
   const SO3 described = robot_.imu.T_link_imu.R.inverse();
   MountFit fit = measure_leg_mount();
@@ -69,6 +89,9 @@ void Examination::examine_leg_rotation() {
     constexpr double stance_method = 0.2, stance_clock_method = 0.0004;  // degrees, s
     method = stance_method;
     clock_method = stance_clock_method;
+  } else if (accelerates && !accelerates_as_it_turns(fit, start.imu.T_link_imu.R)) {
+    accuse_leg_shape();
+    return;
   } else if (accelerates) {
     if (!fit.fit.good) fit.fit.cov = Eigen::MatrixXd::Zero(7, 7);
     fit.fit.good = true;
