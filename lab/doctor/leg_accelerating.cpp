@@ -9,6 +9,8 @@
 namespace kilvo::lab {
 
 LegAcceleration Examination::leg_acceleration(const LegHypothesis* hypothesis, const SO3& R_link_imu, double offset) const {
+  // The acceleration is not what was measured.
+  if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "accel_gravity"; })) return {};
   return fit_leg_acceleration(legs_under(hypothesis), mended_imu(), gyro(), {R_link_imu, robot_.imu.T_link_imu.p}, offset);
 }
 
