@@ -138,7 +138,7 @@ int calibrate(DoctorOptions options) {
   std::vector<lab::Change> changes, refined;
   for (const lab::Finding& f : page.mended) lab::put(changes, f.changes);
   for (const lab::Refinement& r : judged.refinements) {
-    if (r.significant) lab::put(refined, r.changes);
+    if (r.is_taken()) lab::put(refined, r.changes);
   }
   lab::put(changes, refined);
   write_changed(judged.config, options.write, judged.settings, changes);
@@ -179,7 +179,7 @@ void add_calibrate(CLI::App& program, Action& chosen) {
   auto options = std::make_shared<DoctorOptions>();
   CLI::App* verb = program.add_subcommand("calibrate", "measure mounts, focal length and clocks from a recording");
   add_common(*verb, *options);
-  verb->add_option("--out", options->write, "the configuration with what was significantly off put right")->type_name("FILE")->required();
+  verb->add_option("--out", options->write, "the configuration with what is off put right")->type_name("FILE")->required();
   verb->add_option("--report", options->report, "write a page with each value before and after: DIR/calibration.html")->type_name("DIR");
   verb->callback([options, &chosen] { chosen = [options] { return calibrate(*options); }; });
 }

@@ -62,9 +62,9 @@ Measured measured_after(const WrongDescription& first, const RunOptions& options
   return measured(first.t, measured_for, options, settings, used);
 }
 
-void put_significant(std::vector<lab::Change>& changes, const std::vector<lab::Refinement>& refinements) {
+void put_taken(std::vector<lab::Change>& changes, const std::vector<lab::Refinement>& refinements) {
   for (const lab::Refinement& r : refinements) {
-    if (r.significant) lab::put(changes, r.changes);
+    if (r.is_taken()) lab::put(changes, r.changes);
   }
 }
 
@@ -80,7 +80,7 @@ KnownDescription refined(const lab::Settings& settings, const RunOptions& option
   for (int round = 0; round < most_rounds; ++round) {
     const Measured now = measured(std::nullopt, refined_by, options, mended(known, options, config), used);
     if (now.diagnosis.good()) {
-      put_significant(known.refined, now.refinements);
+      put_taken(known.refined, now.refinements);
       return known;
     }
     for (const lab::Finding& f : now.diagnosis.findings) {
@@ -111,7 +111,7 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
       if (known.stops(w)) lab::put(known.mended, w.finding.changes);
     }
     if (!known.mended.empty()) {
-      put_significant(known.mended, measured_after(first, options, mended(known, options, config), used).refinements);
+      put_taken(known.mended, measured_after(first, options, mended(known, options, config), used).refinements);
     }
   } else {
     // What is still wrong was not mended by that.

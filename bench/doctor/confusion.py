@@ -18,6 +18,8 @@ import tempfile
 import numpy as np
 import yaml
 
+import more_cases
+
 
 def rotation(axis, degrees):
     a = math.radians(degrees)
@@ -202,7 +204,7 @@ def description_cases(config, folder, work):
             out.append((f"camera's clock {ms} ms", [f"camera.time_offset={ms / 1000}"], ["camera_clock"]))
     if "legs" in config and config["legs"].get("type", "joints") == "joints":
         out += leg_cases(config, folder, work)
-    return out + mount_cases(config)
+    return out + mount_cases(config) + more_cases.description_cases(config, folder, work, texts, pose, rotation)
 
 
 # --- faults of the messages ---------------------------------------------------------------------------------------------------------
@@ -342,7 +344,7 @@ def data_cases(config):
                 ("ankles exchanged", each_legs(exchange_ankles), ["joints_exchanged"])]
     if "lidar" in config:
         out += [("point times reversed", reversed_times, ["point_times_reversed"]), ("point times absent", no_times, ["point_times_absent"])]
-    return out
+    return out + more_cases.data_cases(config, each_imu, each_legs, rotation)
 
 
 def rewrite(source, target, config, change, topics, until):

@@ -21,7 +21,7 @@ import yaml
 from confusion import data_cases, description_cases, rewrite
 
 # Reasons of events (events.csv) by which a run says that its description or a sensor is not to be trusted.
-REPORTED = re.compile("description|diverged|refused|contradict|left out|doubt|disagree|wrong|lost|offset|clock", re.I)
+REPORTED = re.compile("description|diverged|refused|contradict|left out|doubt|disagree|wrong|lost|offset|clock|of data:", re.I)
 
 
 def read_tum(path):

@@ -61,11 +61,11 @@ std::string readable(const std::vector<double>& x, const std::string& unit) {
 }
 
 std::string row_of(const Refinement& before, const Refinement* after) {
-  const char* const kind = !before.observable ? "unknown" : before.significant && !before.changes.empty() ? "changed" : "kept";
-  const std::string decision = !before.observable       ? "not observable, kept: " + before.advice
-                               : !before.significant    ? "kept"
-                               : before.changes.empty() ? "off, and there is no setting for it"
-                                                        : "changed";
+  const char* const kind = !before.observable ? "unknown" : before.is_taken() && !before.changes.empty() ? "changed" : "kept";
+  const std::string decision = !before.observable                             ? "not observable, kept: " + before.advice
+                               : before.changes.empty() && before.significant ? "off, and there is no setting for it"
+                               : before.changes.empty() || !before.is_taken() ? "kept"
+                                                                              : "changed by " + readable(before.taken, before.unit);
   return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"{}\">{}</td></tr>\n",
                      name_of(before.sensor), escaped(before.what), readable(before.change, before.unit),
                      readable(before.sigma, before.unit), after == nullptr ? "-" : readable(after->change, after->unit),
@@ -88,7 +88,9 @@ std::string to_html(const Calibration& calibration) {
   }
   out +=
       "<h2>Measured less described</h2>\n<p>Hollow red: as described. Blue: measured again with the settings that were written. "
-      "The green band is three standard deviations wide on either side; only what lies outside of it is changed. A picture ends at ten."
+      "The green band is three standard deviations wide on either side. A change is smaller than what was measured by the share that "
+      "chance "
+      "explains. A picture ends at ten."
       "</p>\n<div class=\"wide\"><table>\n<tr><th>sensor</th><th>value</th><th>before</th><th>standard deviation</th><th>after</th>"
       "<th>in standard deviations</th><th>decision</th></tr>\n";
   for (const Refinement& before : calibration.before) {

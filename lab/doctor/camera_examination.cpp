@@ -227,8 +227,8 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
   constexpr double method = 0.08, focal_method = 0.0025, clock_method = 0.0002;  // degrees, of the focal length, s
   refine_rotation(Sensor::camera, "rotation of the camera on the IMU", before, fit.R_IC, sigma, method, "camera.T_imu_camera.R");
   Refinement r = refinement(Sensor::camera, "focal length", {fit.focal - 1}, {fit.fit.sigma(3)}, focal_method, 0.01, fmt::format("-"));
-  r.changes = {{"camera.fx", fmt::format("{:.3f}", fit.focal * robot_.camera.fx)},
-               {"camera.fy", fmt::format("{:.3f}", fit.focal * robot_.camera.fy)}};
+  r.changes = {{"camera.fx", fmt::format("{:.3f}", (1 + r.taken[0]) * robot_.camera.fx)},
+               {"camera.fy", fmt::format("{:.3f}", (1 + r.taken[0]) * robot_.camera.fy)}};
   refinements_.push_back(std::move(r));
   refine_offset(Sensor::camera, fit.offset, fit.fit.sigma(4), clock_method);
   if (angle > std::max(camera_rotation_tolerance, sure * uncertain) && angle < 15 && accuse_principal_point(tracks, fit)) return;

@@ -24,6 +24,8 @@ std::string rotation_text(const SO3& R) {
   return fmt::format("[{}]", fmt::join(x, ", "));
 }
 
+SO3 turned_by(const SO3& described, const Refinement& r) { return described * SO3::Exp(r.taken_vector() / degrees(1)); }
+
 std::string turn_text(const SO3& turn) {
   const Eigen::Vector3d v = turn.Log();
   const double angle = v.norm();
@@ -88,7 +90,7 @@ void Examination::refine_rotation(Sensor sensor, const std::string& what, const 
   const Eigen::Vector3d turn = (described.inverse() * measured).Log();
   Refinement r = refinement(sensor, what, {degrees(turn.x()), degrees(turn.y()), degrees(turn.z())},
                             {degrees(sigma.x()), degrees(sigma.y()), degrees(sigma.z())}, method, largest, "deg");
-  r.changes = {{key, rotation_text(measured)}};
+  r.changes = {{key, rotation_text(turned_by(described, r))}};
   refinements_.push_back(std::move(r));
 }
 
@@ -96,7 +98,7 @@ void Examination::refine_offset(Sensor sensor, double offset, double sigma, doub
   constexpr double largest = 0.002;  // s
   Refinement r = refinement(sensor, fmt::format("clock of the {}", name_of(sensor)), {offset}, {sigma}, method, largest, fmt::format("s"));
   r.changes = {
-      {fmt::format("{}.time_offset", name_of(sensor)), fmt::format("{:.5f}", time_offsets_of(original_)[index_of(sensor)] + offset)}};
+      {fmt::format("{}.time_offset", name_of(sensor)), fmt::format("{:.5f}", time_offsets_of(original_)[index_of(sensor)] + r.taken[0])}};
   refinements_.push_back(std::move(r));
 }
 

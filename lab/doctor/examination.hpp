@@ -7,6 +7,7 @@
 #include "kilvo/sensors/robot.hpp"
 #include "lab/doctor/camera_fit.hpp"
 #include "lab/doctor/finding.hpp"
+#include "lab/doctor/leg_acceleration.hpp"
 #include "lab/doctor/leg_path.hpp"
 #include "lab/doctor/recorded.hpp"
 #include "lab/doctor/refinement.hpp"
@@ -105,6 +106,14 @@ class Examination {
   LegScore score_legs(const std::vector<LegPose>& path, double offset, bool any_mount) const;
   std::vector<LegPose> legs_under(const LegHypothesis* hypothesis, double period = pose_period) const;
   bool try_leg_hypotheses();
+  // leg_accelerating.cpp
+  LegAcceleration leg_acceleration(const LegHypothesis* hypothesis, const SO3& R_link_imu, double offset) const;
+  bool try_acceleration_hypotheses();
+  void examine_leg_size();
+  bool accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const;
+  void accuse_leg_shape();
+  void examine_joint_speeds();
+  // leg_mount.cpp
   MountFit measure_leg_mount() const;
   void examine_leg_rotation();
   void examine_leg_clock(const MountFit& fit, double method, double tolerance);
@@ -163,6 +172,7 @@ class Examination {
   double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock
   std::optional<TranslationFit> translation_;
   std::optional<StanceFit> stances_;
+  LegAcceleration leg_acceleration_;  // under the mount that was settled
   Diagnosis diagnosis_;
   std::vector<Refinement> refinements_;
 };
@@ -173,6 +183,8 @@ std::vector<Turn> turns_of(const std::vector<SweepPose>& way);
 std::string rotation_text(const SO3& R);  // as YAML, row by row
 std::string vector_text(const Eigen::Vector3d& p);
 std::string number_text(double x);
+/// With what is taken of a refinement in degrees about the axes of the rotated frame.
+SO3 turned_by(const SO3& described, const Refinement& r);
 /// "5.0 degrees about y": the axis is named when the rotation is about one.
 std::string turn_text(const SO3& turn);
 inline constexpr double most_tilt = 50;  // degrees: a robot that walks is upright

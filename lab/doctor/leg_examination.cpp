@@ -117,6 +117,15 @@ bool Examination::examine_leg_names() {
           true});
     std::swap(robot_.feet[0], robot_.feet[1]);
   }
+  constexpr double no_robot = 3;  // m
+  if (Eigen::Vector3d& p = robot_.imu.T_link_imu.p; p.norm() > no_robot) {
+    Finding f{Sensor::imu, "imu_mount_position", {}, "no robot is as large", {}, p.norm(), "m", {}, true};
+    f.text = fmt::format("the IMU's position of {:.0f} m on its link is in millimetres", p.norm());
+    p *= 1e-3;
+    f.remedy = fmt::format("imu.T_link_imu.p: {}", vector_text(p));
+    f.changes = {{"imu.T_link_imu.p", vector_text(p)}};
+    find(std::move(f));
+  }
   double farthest = 0;
   for (auto& foot : robot_.feet) {
     for (const Eigen::Vector3d& corner : foot.sole) farthest = std::max(farthest, corner.norm());
@@ -181,11 +190,12 @@ void Examination::examine_legs() {
     return;
   }
   if (!examine_leg_names()) return;
+  examine_joint_speeds();
   leg_turns_ = leg_turns(legs_under(nullptr), turn_interval);
   legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
   // A clock that is off first: any joint looks wrong at another time.
   leg_offset_ = legs_.known ? legs_.offset : 0;
-  if (find_leg_start() || try_leg_hypotheses() || try_standing_hypotheses()) {
+  if (find_leg_start() || try_leg_hypotheses() || try_standing_hypotheses() || try_acceleration_hypotheses()) {
     leg_turns_ = leg_turns(legs_under(nullptr), turn_interval);
     legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
   }
@@ -196,6 +206,8 @@ void Examination::examine_legs() {
     check(Sensor::legs, "mount of the IMU, joints, clock", Check::Verdict::unknown, detail);
     return;
   }
+  if (!legs_turned() && lidar_way().empty())
+    leg_acceleration_ = leg_acceleration(leg_mend_ ? &*leg_mend_ : nullptr, robot_.imu.T_link_imu.R, leg_offset_);
   if (!legs_turned()) {
     check(Sensor::legs, "mount of the IMU, clock", Check::Verdict::unknown,
           fmt::format("the robot turned by {:.2f} rad/s only, {:.2f} about one of its axes: walk and turn", legs_.turning, legs_.weakest));

@@ -1,6 +1,8 @@
 // The IMU on the link that the legs carry, and the legs' clock: by their turning, and by the feet that stand.
+#include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
+#include <functional>
 
 #include "lab/doctor/examination.hpp"
 
@@ -8,6 +10,7 @@ namespace kilvo::lab {
 namespace {
 
 constexpr double leg_rotation_tolerance = 2.5;  // degrees
+constexpr double well_explained = 0.9;          // of the legs' acceleration
 // s, with and without a LiDAR: without one, soles that roll shift it by 6 ms, soft ones by more.
 constexpr double leg_clock_tolerance = 0.0045, alone_leg_clock_tolerance = 0.025;
 
@@ -31,6 +34,26 @@ MountFit Examination::measure_leg_mount() const {
   return fit.fit.good ? fit : fit_from(described);
 }
 
+// The turning tells the mount to some degrees, whatever the lengths; the acceleration to half of one, if they are right.
+bool Examination::accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const {
+  const SO3 by_acceleration = R_link_imu.inverse() * SO3::Exp(leg_acceleration_.turn), described = robot_.imu.T_link_imu.R.inverse();
+  const double angle = (by_acceleration * described.inverse()).Log().norm();
+  if (degrees(angle) < leg_rotation_tolerance) return true;
+  return by_turning.fit.good && (by_acceleration * by_turning.R.inverse()).Log().norm() < 0.5 * angle;
+}
+
+void Examination::accuse_leg_shape() {
+  const double angle = leg_acceleration_.turn.norm();
+  Finding f{Sensor::legs, "leg_lengths", {}, {}, {}, std::sin(angle), {}, {}, true};
+  f.text =
+      fmt::format("the lengths of thigh and shin do not fit each other: by them the robot accelerates in a direction {:.1f} degrees off",
+                  degrees(angle));
+  f.evidence = fmt::format("the legs turn as the gyro does with the described mount; {:.0f} % of their acceleration is explained",
+                           100 * leg_acceleration_.explained);
+  f.remedy = "robot.urdf: the lengths of thigh and shin, or the URDF of this robot";
+  find(std::move(f));
+}
+
 void Examination::examine_leg_rotation() {
   const SO3 described = robot_.imu.T_link_imu.R.inverse();
   MountFit fit = measure_leg_mount();
@@ -50,7 +73,9 @@ void Examination::examine_leg_rotation() {
   if (!way.empty())
     stances = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(),
                           fit.fit.good && !leg_start_ ? fit.offset : leg_offset_);
-  if (!fit.fit.good && !stances.good) {
+  if (!stances.good) leg_acceleration_ = leg_acceleration(nullptr, start.imu.T_link_imu.R, fit.fit.good ? fit.offset : leg_offset_);
+  const bool accelerates = leg_acceleration_.explained > well_explained;
+  if (!fit.fit.good && !stances.good && !accelerates) {
     check(Sensor::legs, "mount of the IMU", Check::Verdict::unknown, "too few steps");
     return;
   }
@@ -64,11 +89,24 @@ void Examination::examine_leg_rotation() {
     constexpr double stance_method = 0.2, stance_clock_method = 0.0004;  // degrees, s
     method = stance_method;
     clock_method = stance_clock_method;
+  } else if (accelerates && !accelerates_as_it_turns(fit, start.imu.T_link_imu.R)) {
+    accuse_leg_shape();
+    return;
+  } else if (accelerates) {
+    if (!fit.fit.good) fit.fit.cov = Eigen::MatrixXd::Zero(7, 7);
+    fit.fit.good = true;
+    fit.R = start.imu.T_link_imu.R.inverse() * SO3::Exp(leg_acceleration_.turn);
+    fit.offset = leg_acceleration_.offset;
+    for (int i = 0; i < 3; ++i) fit.fit.cov(i, i) = leg_acceleration_.sigma[i] * leg_acceleration_.sigma[i];
+    fit.fit.cov(3, 3) = leg_acceleration_.offset_sigma * leg_acceleration_.offset_sigma;
+    method = 0.5 + 10 * (1 - leg_acceleration_.explained);
+    clock_method = 0.001 + 0.04 * (1 - leg_acceleration_.explained);
   }
   leg_offset_ = fit.offset;
   refine_rotation(Sensor::imu, "rotation of the IMU on the robot", described, fit.R, fit.rotation_sigma(), method, "imu.T_link_imu.R");
-  for (double& x : refinements_.back().change) x = -x;  // of the mount, not of its inverse
-  refinements_.back().changes = {{"imu.T_link_imu.R", rotation_text(fit.R.inverse())}};
+  Refinement& mount = refinements_.back();
+  mount.changes = {{"imu.T_link_imu.R", rotation_text(turned_by(described, mount).inverse())}};
+  for (auto* x : {&mount.change, &mount.taken}) std::ranges::transform(*x, x->begin(), std::negate());  // of the mount, not of its inverse
   if (!recorded_.leg_clock_is_found) refine_offset(Sensor::legs, fit.offset, fit.offset_sigma(), clock_method);
   if (stances.good) refine_zeros(stances);
   const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
@@ -76,17 +114,17 @@ void Examination::examine_leg_rotation() {
   const std::string detail = fmt::format("{:.1f} degrees from the description, standard deviation {:.1f}; {:.0f} % explained", angle,
                                          uncertain, 100 * fit.explained);
   constexpr double alone_tolerance = 12;  // degrees: legs and gyro alone
-  if (angle > std::max(stances.good ? leg_rotation_tolerance : alone_tolerance, sure * uncertain)) {
+  if (angle > std::max(stances.good || accelerates ? leg_rotation_tolerance : alone_tolerance, sure * uncertain)) {
     settle_imu_link(fit.R.inverse());
     if (!diagnosis_.findings.empty() && diagnosis_.findings.back().cause == "imu_mount_rotation") {
       diagnosis_.findings.back().turn = turn;
       diagnosis_.findings.back().evidence = "turning of the legs against the gyro's: " + detail;
     }
   } else {
-    seems_wrong(Sensor::imu) |= stances.good ? angle > leg_rotation_tolerance : !way.empty();
+    seems_wrong(Sensor::imu) |= stances.good || accelerates ? angle > leg_rotation_tolerance : !way.empty();
     check(Sensor::imu, "rotation of its mount on the robot", uncertain > 3 ? Check::Verdict::unknown : Check::Verdict::good, detail);
   }
-  if (stances.good) fit.explained = 1;  // the feet stand
+  if (stances.good || accelerates) fit.explained = 1;  // the feet stand
   examine_leg_clock(fit, clock_method, stances.good ? leg_clock_tolerance : alone_leg_clock_tolerance);
 }
 

@@ -33,7 +33,7 @@ void Examination::examine_lidar_position() {
   constexpr double method = 0.004, largest = 0.01;  // m
   Refinement r = refinement(Sensor::lidar, "position of the LiDAR on the IMU", {error.x(), error.y(), error.z()},
                             {sigma.x(), sigma.y(), sigma.z()}, method, largest, fmt::format("m"));
-  r.changes = {{"lidar.T_imu_lidar.p", vector_text(fit.r)}};
+  r.changes = {{"lidar.T_imu_lidar.p", vector_text(described + r.taken_vector())}};
   refinements_.push_back(std::move(r));
   bool wrong = false;
   for (int i = 0; i < 3; ++i) wrong |= std::abs(error[i]) > std::max(position_tolerance, sure_of_position * sigma[i]);

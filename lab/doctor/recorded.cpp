@@ -50,7 +50,7 @@ void Recorder::take(const JointSample& sample) {
   // Before a clock is found, or once another one is, the stamps are off by something else: only what follows can be judged.
   if (recorded_.leg_clock_is_found && std::abs(t - last_leg_ - leg_period) > leg_step) recorded_.legs.clear();
   last_leg_ = t;
-  recorded_.legs.push_back({t, sample.position});
+  recorded_.legs.push_back({t, sample.position, sample.velocity});
 }
 
 void Recorder::take(const LidarScan& scan) {

@@ -31,6 +31,7 @@ struct InertialSample {
 struct LegSample {
   double t = 0;
   std::vector<double> position;
+  std::vector<double> velocity;  // may be empty
 };
 
 struct StampStatistics {

@@ -1,0 +1,250 @@
+#include "lab/doctor/leg_acceleration.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "kilvo/math/so3.hpp"
+#include "lab/doctor/robust_fit.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+// s, between the poses of a row: half of the shortest step, in which the body is displaced by a centimetre against uniform motion.
+constexpr double interval = 0.1;
+constexpr std::size_t fewest_rows = 60;  // of three equations each
+constexpr double turn_prior = 1, place_prior = 0.02, bias_prior = 0.15, gyro_prior = 0.01,
+                 clock_prior = 0.05;  // rad, m, m/s^2, rad/s, s
+
+// Unknowns of a row: ratio of the lengths, mount (3), place of the IMU (3), gravity (3), biases of gyro (3) and accelerometer (3), clock of
+// the legs; and the row's right side.
+constexpr int of_turn = 1, of_place = 4, of_gravity = 7, of_gyro = 10, of_bias = 13, of_clock = 16, unknowns = 17;
+using Row = Eigen::Matrix<double, 3, unknowns + 1>;
+using Gram = Eigen::Matrix<double, unknowns + 1, unknowns + 1>;
+
+/// The specific force integrated twice, in the frame of the IMU at the beginning.
+class ForceIntegral {
+ public:
+  ForceIntegral(const std::vector<InertialSample>& imu, const GyroPath& gyro) {
+    for (const InertialSample& s : imu) {
+      if (!gyro.covers(s.t, s.t) || (!steps_.empty() && s.t <= steps_.back().t)) continue;
+      const Eigen::Matrix3d R = gyro.at(s.t).toRotationMatrix();
+      Step next{s.t, R * s.accel, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), R, Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
+      if (!steps_.empty()) {
+        const Step& last = steps_.back();
+        const double dt = next.t - last.t;
+        next.v = last.v + 0.5 * dt * (last.f + next.f);
+        next.p = last.p + dt * last.v + dt * dt * (last.f / 3 + next.f / 6);
+        next.Rv = last.Rv + 0.5 * dt * (last.R + next.R);
+        next.Rp = last.Rp + dt * last.Rv + dt * dt * (last.R / 3 + next.R / 6);
+      }
+      steps_.push_back(next);
+    }
+  }
+  bool covers(double a, double b) const { return steps_.size() > 1 && a >= steps_.front().t && b <= steps_.back().t; }
+  Eigen::Vector3d place(double t) const {
+    const Step& s = before(t);
+    const double dt = t - s.t;
+    return s.p + dt * s.v + 0.5 * dt * dt * s.f;
+  }
+  Eigen::Matrix3d place_by_bias(double t) const {
+    const Step& s = before(t);
+    const double dt = t - s.t;
+    return s.Rp + dt * s.Rv + 0.5 * dt * dt * s.R;
+  }
+  /// Integral of the rotation of the IMU, by which its gyro's bias turns.
+  const Eigen::Matrix3d& turned(double t) const { return before(t).Rv; }
+  Eigen::Vector3d gravity() const { return -(steps_.back().v - steps_.front().v) / (steps_.back().t - steps_.front().t); }
+  /// Upwards, about this time.
+  Eigen::Vector3d up(double t) const {
+    constexpr double half = 0.5;  // s
+    return (before(t + half).v - before(t - half).v).normalized();
+  }
+
+ private:
+  struct Step {
+    double t;
+    Eigen::Vector3d f, v, p;
+    Eigen::Matrix3d R, Rv, Rp;
+  };
+  const Step& before(double t) const {
+    const auto after = std::ranges::upper_bound(steps_, t, {}, &Step::t);
+    return after == steps_.begin() ? *after : *std::prev(after);
+  }
+  std::vector<Step> steps_;
+};
+
+Eigen::Vector3d middle_of(const FootPose& foot) {
+  Eigen::Vector3d out = Eigen::Vector3d::Zero();
+  for (int i = 0; i < foot.corners; ++i) out += foot.p[static_cast<std::size_t>(i)] / foot.corners;
+  return out;
+}
+
+/// A pose of the legs on the IMU's clock.
+struct Moment {
+  double t = 0;
+  Eigen::Matrix3d R_WL = Eigen::Matrix3d::Identity();
+  std::array<Eigen::Vector3d, 2> sole;  // in the link's frame
+  std::array<Eigen::Vector3d, 2> speed{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  std::size_t lower = 0;  // foot
+};
+
+std::vector<Moment> moments_of(const std::vector<LegPose>& path, const ForceIntegral& force, const GyroPath& gyro, const SO3& R_IL,
+                               double offset) {
+  std::vector<Moment> out;
+  for (const LegPose& pose : path) {
+    const double t = pose.t + offset;
+    if (!force.covers(t, t) || !gyro.covers(t, t)) continue;
+    Moment m;
+    m.t = t;
+    m.R_WL = gyro.at(t).toRotationMatrix() * R_IL.matrix();
+    m.sole = {middle_of(pose.foot[0]), middle_of(pose.foot[1])};
+    m.lower = force.up(t).dot(m.R_WL * (m.sole[1] - m.sole[0])) < 0 ? 1 : 0;
+    out.push_back(m);
+  }
+  for (std::size_t i = 1; i + 1 < out.size(); ++i) {
+    for (std::size_t f = 0; f < 2; ++f)
+      out[i].speed[f] = (out[i + 1].sole[f] - out[i - 1].sole[f]) / std::max(1e-6, out[i + 1].t - out[i - 1].t);
+  }
+  return out;
+}
+
+// Second difference of something at three times, as a change of place in `interval`.
+template <class F>
+auto bend(const std::array<const Moment*, 3>& at, F&& of) {
+  const double before = at[1]->t - at[0]->t, after = at[2]->t - at[1]->t, mean = 0.5 * (before + after);
+  return (mean * ((of(*at[2]) - of(*at[1])) / after - (of(*at[1]) - of(*at[0])) / before)).eval();
+}
+
+Row row_of(const std::array<const Moment*, 3>& at, const ForceIntegral& force, const Eigen::Vector3d& p_LI) {
+  const std::size_t foot = at[1]->lower;
+  const double span = 0.5 * (at[2]->t - at[0]->t);
+  const Eigen::Matrix3d R = bend(at, [](const Moment& m) -> Eigen::Matrix3d { return m.R_WL; });
+  Row row;
+  row.col(0) = bend(at, [&](const Moment& m) { return force.place(m.t); });
+  row.middleCols<3>(of_turn) = -bend(at, [&](const Moment& m) -> Eigen::Matrix3d { return m.R_WL * skew(m.sole[foot] - p_LI); });
+  row.middleCols<3>(of_place) = -R;
+  row.middleCols<3>(of_gravity) = span * span * Eigen::Matrix3d::Identity();
+  // A gyro with a bias sees gravity turn.
+  row.middleCols<3>(of_gyro) = -span * span * skew(force.gravity()) * force.turned(at[1]->t);
+  row.middleCols<3>(of_bias) = -bend(at, [&](const Moment& m) { return force.place_by_bias(m.t); });
+  row.col(of_clock) = -bend(at, [&](const Moment& m) -> Eigen::Vector3d { return m.R_WL * m.speed[foot]; });
+  row.col(unknowns) = -bend(at, [&](const Moment& m) -> Eigen::Vector3d { return m.R_WL * (m.sole[foot] - p_LI); });
+  return row;
+}
+
+/// Of times at which one foot is the lower one all along.
+struct Rows {
+  std::vector<Row> rows;
+  std::vector<int> seconds;
+};
+
+Rows rows_of(const std::vector<Moment>& moments, const ForceIntegral& force, const Eigen::Vector3d& p_LI) {
+  Rows out;
+  double last = -1e9;
+  std::size_t changed = 0, a = 0;  // where the lower foot became the lower one; a row's first moment
+  for (std::size_t c = 1; c < moments.size(); ++c) {
+    if (moments[c].lower != moments[c - 1].lower) changed = c;
+    const double begin = moments[c].t - 2 * interval;
+    while (moments[a + 1].t <= begin) ++a;
+    if (a < changed || moments[a].t > begin + 0.5 * interval || moments[a].t < begin - 0.5 * interval) continue;
+    const auto b = std::ranges::lower_bound(moments, 0.5 * (moments[a].t + moments[c].t), {}, &Moment::t);
+    if (b->t - last < 0.5 * interval) continue;
+    const double shorter = std::min(b->t - moments[a].t, moments[c].t - b->t);
+    if (shorter < 0.7 * interval) continue;
+    last = b->t;
+    out.rows.push_back(row_of({&moments[a], &*b, &moments[c]}, force, p_LI));
+    out.seconds.push_back(static_cast<int>(b->t));
+  }
+  return out;
+}
+
+struct Solution {
+  Eigen::Matrix<double, unknowns, 1> x = Eigen::Matrix<double, unknowns, 1>::Zero();
+  Gram gram;  // weighted, with the prior
+  Eigen::Matrix<double, unknowns, unknowns> cov;
+};
+
+Solution solve(const Rows& of) {
+  constexpr int iterations = 15;
+  Eigen::Matrix<double, unknowns, 1> prior = Eigen::Matrix<double, unknowns, 1>::Zero();
+  prior.segment<3>(of_turn).setConstant(1 / (turn_prior * turn_prior));
+  prior.segment<3>(of_place).setConstant(1 / (place_prior * place_prior));
+  prior.segment<3>(of_bias).setConstant(1 / (bias_prior * bias_prior));
+  prior.segment<3>(of_gyro).setConstant(1 / (gyro_prior * gyro_prior));
+  prior[of_clock] = 1 / (clock_prior * clock_prior);
+  struct Block {
+    Eigen::Matrix<double, unknowns, unknowns> H = Eigen::Matrix<double, unknowns, unknowns>::Zero();
+    Eigen::Matrix<double, unknowns, 1> g = Eigen::Matrix<double, unknowns, 1>::Zero();
+  };
+  Solution out;
+  double s2 = 1e-5;  // m^2: of a sole that rolls
+  for (int k = 0; k < iterations; ++k) {
+    std::vector<Block> blocks;
+    std::vector<double> lengths;
+    out.gram.setZero();
+    for (std::size_t i = 0; i < of.rows.size(); ++i) {
+      const auto J = of.rows[i].leftCols<unknowns>();
+      const Eigen::Vector3d e = of.rows[i].col(unknowns) - J * out.x;
+      lengths.push_back(e.squaredNorm());
+      const double weight = 1 / (1 + e.squaredNorm() / (6 * s2));
+      out.gram += weight * of.rows[i].transpose() * of.rows[i];
+      if (blocks.empty() || of.seconds[i] != of.seconds[i - 1]) blocks.emplace_back();
+      blocks.back().H += weight * J.transpose() * J;
+      blocks.back().g += weight * J.transpose() * e;
+    }
+    out.gram.diagonal().head<unknowns>() += s2 * prior;
+    const Eigen::Matrix<double, unknowns, unknowns> H = out.gram.topLeftCorner<unknowns, unknowns>();
+    out.x = H.ldlt().solve(out.gram.topRightCorner<unknowns, 1>());
+    if (k + 1 == iterations) out.cov = jackknife(blocks, H);
+    const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+    std::ranges::nth_element(lengths, middle);
+    constexpr double median_of_three = 2.366;  // of chi-square
+    s2 = *middle / median_of_three + 1e-12;
+  }
+  return out;
+}
+
+}  // namespace
+
+LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const std::vector<InertialSample>& imu, const GyroPath& gyro,
+                                     const SE3& T_link_imu, double offset) {
+  LegAcceleration out;
+  if (imu.size() < 2) return out;
+  const ForceIntegral force(imu, gyro);
+  out.offset = offset;
+  Solution found;
+  // The clock is not linear.
+  constexpr int rounds = 3;
+  for (int k = 0; k < rounds; ++k) {
+    const std::vector<Moment> moments = moments_of(path, force, gyro, T_link_imu.R.inverse(), out.offset);
+    const Rows rows = rows_of(moments, force, T_link_imu.p);
+    out.rows = rows.rows.size();
+    if (out.rows < fewest_rows) return out;
+    found = solve(rows);
+    constexpr double most = 0.05;  // s
+    if (k + 1 < rounds) out.offset += std::clamp(found.x[of_clock], -most, most);
+  }
+  // Of the two accelerations, what the other unknowns do not explain.
+  constexpr int others = unknowns - 1;
+  const Eigen::Matrix<double, others, others> H = found.gram.block<others, others>(1, 1);
+  Eigen::Matrix<double, others, 2> both;
+  both << found.gram.block<others, 1>(1, 0), found.gram.block<others, 1>(1, unknowns);
+  Eigen::Matrix2d rest;
+  rest << found.gram(0, 0), found.gram(0, unknowns), found.gram(unknowns, 0), found.gram(unknowns, unknowns);
+  rest -= both.transpose() * H.ldlt().solve(both);
+  const double together = rest(0, 1);
+  if (!(rest(0, 0) > 0 && rest(1, 1) > 0 && together > 0) || !found.x.allFinite()) return out;
+  out.good = true;
+  out.least_scale = together / rest(0, 0);
+  out.most_scale = rest(1, 1) / together;
+  out.explained = out.least_scale / out.most_scale;
+  out.offset_sigma = std::sqrt(found.cov(of_clock, of_clock));
+  out.scale_sigma = std::sqrt(found.cov(0, 0));
+  out.turn = found.x.segment<3>(of_turn);
+  out.sigma = found.cov.diagonal().segment<3>(of_turn).cwiseSqrt();
+  return out;
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,29 @@
+// What standing legs say of the acceleration against what the accelerometer says: sizes of the legs and the IMU's mount on the robot
+// without any other sensor and on any ground. While a sole stands, the joints and the gyro give the IMU's way over it, whose second
+// differences must be those of the specific force and gravity. R. Frisch, "Statistical confluence analysis", 1934: where both are noisy,
+// the true ratio lies between the regression of the one on the other and that of the other on the one.
+#pragma once
+
+#include <vector>
+
+#include "lab/doctor/gyro_path.hpp"
+#include "lab/doctor/leg_path.hpp"
+
+namespace kilvo::lab {
+
+struct LegAcceleration {
+  bool good = false;                    // enough steps
+  double offset = 0, offset_sigma = 0;  // s: the legs' stamps plus this are on the IMU's clock
+  double explained = 0;                 // squared correlation of the two accelerations, without what the unknowns beside the scale explain
+  double least_scale = 0;               // size of the legs as described through their size as the accelerometer has it: between these
+  double most_scale = 0;                //
+  double scale_sigma = 0;               // of either
+  Eigen::Vector3d turn, sigma;          // rad, frame of the link: true mount of the link on the IMU = described * Exp(turn)
+  std::size_t rows = 0;
+};
+
+/// `path`: both feet in the frame of the link. `imu`: SI units, IMU frame. Starts from `offset` (s).
+LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const std::vector<InertialSample>& imu, const GyroPath& gyro,
+                                     const SE3& T_link_imu, double offset);
+
+}  // namespace kilvo::lab
