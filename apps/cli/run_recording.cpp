@@ -222,7 +222,6 @@ class Run {
     if (!estimator_.initialised()) return estimator_.waiting_for();
     return fmt::format("{} sweeps, {:.1f} m", files_.run_summary().sweeps(), files_.run_summary().path_length());
   }
-
   std::string failure(bool interrupted) const {
     return interrupted ? "stopped by the user" : failure_of(files_.run_summary(), estimator_, !source_.topic(Sensor::lidar).empty());
   }
