@@ -16,7 +16,8 @@ void StationarityDetector::close_block(const Eigen::Vector3d& gyro_bias) {
   const Eigen::Vector3d accel_sigma = (accel2_ / n_ - accel.cwiseAbs2()).cwiseMax(0).cwiseSqrt();
   constexpr double largest_change = 0.01;  // rad/s
   const bool quiet = n_ > 5 && gyro_sigma.maxCoeff() < still_gyro_ && accel_sigma.maxCoeff() < still_accel_ &&
-                     (gyro - gyro_bias).norm() < largest_resting_rate && (quiet_blocks_ == 0 || (gyro - resting_gyro_).norm() < largest_change);
+                     (gyro - gyro_bias).norm() < largest_resting_rate &&
+                     (quiet_blocks_ == 0 || (gyro - resting_gyro_).norm() < largest_change);
   quiet_blocks_ = quiet ? quiet_blocks_ + 1 : 0;
   resting_gyro_ = gyro;
 }

@@ -77,7 +77,8 @@ void VoxelMap::trace(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     const std::uint32_t root = roots_.find(root_key(leaf));
     const bool empty = root == none || (nodes_[root].is_plane && !passes(nodes_[root].plane, from, to, clear));
     if (!empty && is_passed(root, leaf, from, to, last)) return;
-    way += beyond + (empty ? way_out(x, inverse_direction, root_of(leaf), config_.voxel_size) : way_out(x, inverse_direction, leaf, clear));
+    const Leaf in_grid = empty ? Leaf{leaf[0] >> depth, leaf[1] >> depth, leaf[2] >> depth} : leaf;
+    way += beyond + way_out(x, inverse_direction, in_grid, empty ? config_.voxel_size : clear);
   }
 }
 

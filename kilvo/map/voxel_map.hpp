@@ -120,7 +120,6 @@ class VoxelMap {
   Leaf leaf_of(const Eigen::Vector3d& x) const {
     return {fast_floor(x.x() * leaves_per_metre_), fast_floor(x.y() * leaves_per_metre_), fast_floor(x.z() * leaves_per_metre_)};
   }
-  static Leaf root_of(const Leaf& l) { return {l[0] >> depth, l[1] >> depth, l[2] >> depth}; }
   static VoxelKey root_key(const Leaf& l) { return pack_key(l[0] >> depth, l[1] >> depth, l[2] >> depth); }
   static std::size_t octant(const Leaf& l, int level) {
     const int bit = depth - 1 - level;
