@@ -16,7 +16,6 @@ void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservab
   // A few at a time: what is made of them is used while it is in the cache.
   constexpr std::size_t at_once = 32;
   std::vector<Eigen::Vector3d> seen;
-  seen.reserve(sweep.clusters.size());
   for (std::span<const PointCluster> rest = sweep.clusters; !rest.empty(); rest = rest.subspan(std::min(at_once, rest.size()))) {
     const std::vector<PointGroup> groups = to_world(rest.first(std::min(at_once, rest.size())), T_WI, p_IL_, lidar_);
     surfaces_.insert(groups, epoch);
