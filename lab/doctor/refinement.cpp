@@ -60,7 +60,9 @@ Refinement refinement(Sensor sensor, const std::string& what, std::vector<double
     const bool known = sigma[i] <= largest_sigma;
     out.observable = out.observable || known;
     out.significant = out.significant || (known && std::abs(change[i]) > significant_change * sigma[i]);
-    out.taken.push_back(known ? change[i] * variance / (variance + sigma[i] * sigma[i]) : 0);
+    // Of a single number no estimator is better than what is described wherever that is right (C. Stein, 1956): it must be significant.
+    const bool is_taken = known && (change.size() > 1 || out.significant);
+    out.taken.push_back(is_taken ? change[i] * variance / (variance + sigma[i] * sigma[i]) : 0);
   }
   out.change = std::move(change);
   out.sigma = std::move(sigma);
