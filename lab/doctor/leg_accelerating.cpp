@@ -31,8 +31,9 @@ bool Examination::try_acceleration_hypotheses() {
     const LegAcceleration other = leg_acceleration(&h, R, leg_offset_);
     // Many are tried: one that needs another mount or size besides fits by chance.
     constexpr double near = 0.1, alike = 1.1;  // rad, -
-    if (!other.good || 1 - other.explained >= least || other.turn.norm() > near || other.least_scale > alike ||
-        alike * other.most_scale < 1)
+    // Of a robot that stands, or has walked for two seconds, no size is known.
+    const bool known = other.good && sure * other.scale_sigma < other.least_scale;
+    if (!known || 1 - other.explained >= least || other.turn.norm() > near || other.least_scale > alike || alike * other.most_scale < 1)
       continue;
     least = 1 - other.explained;
     then = other;
@@ -100,6 +101,10 @@ void Examination::examine_leg_size() {
       "deviation {:.3f}",
       1 / fit.most_scale, 1 / fit.least_scale, fit.scale_sigma);
   const double margin = std::max(tolerance, sure * fit.scale_sigma);
+  if (margin > fit.least_scale) {
+    check(Sensor::legs, "lengths of the legs", Check::Verdict::unknown, detail);
+    return;
+  }
   const bool longer = fit.least_scale > 1 + margin, shorter = fit.most_scale < 1 - margin;
   if (!longer && !shorter) {
     check(Sensor::legs, "lengths of the legs", Check::Verdict::good, detail);

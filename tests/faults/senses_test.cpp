@@ -262,7 +262,7 @@ TEST_F(Senses, OneClippedSampleIsSeenAndCostsLittle) {
       EXPECT_TRUE(has(o, of_gyro ? Reason::gyro_clipped : Reason::accel_clipped));
       // Without legs nothing tells of a velocity that is wrong by 0.15 m/s before the next sweep.
       EXPECT_LT(o.worst(&Moment::error, 0, 14), as_usual + (with_legs ? 0.003 : 0.015));
-      EXPECT_LT(o.worst(&Moment::error, 8.3, 14), as_usual + 0.001);
+      EXPECT_LT(o.worst(&Moment::error, 8.3, 14), as_usual + 0.0015);
       EXPECT_LT(o.worst(&Moment::sigmas, 0, 14), 4.0);
       EXPECT_LT(o.worst(&Moment::accel_bias, 5, 14), 0.2);
       if (with_legs && !of_gyro) {
