@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "kilvo/input/reorder_buffer.hpp"
+#include "kilvo/sensors/measurement.hpp"
 
 namespace kilvo {
 namespace {

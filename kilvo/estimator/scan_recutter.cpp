@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "kilvo/input/reorder_buffer.hpp"
+#include "kilvo/sensors/measurement.hpp"
 
 namespace kilvo {
 

@@ -40,6 +40,7 @@ void InputQueue::admit(Measurement m, std::optional<Reason> off_clock) {
   const Sensor s = sensor_of(m);
   if (const auto fault = fault_of(m)) return refuse(s, *fault);
   if (off_clock) return refuse(s, *off_clock);
+  if (auto* scan = std::get_if<LidarScan>(&m)) scan->offsets = offsets_of(*scan);
   if (const auto fault = health_.judge(m)) return refuse(s, *fault);
   std::visit([by = shift_[index_of(s)]](auto& what) { what.t += by; }, m);
   timeline_.push(std::move(m));

@@ -24,18 +24,6 @@ Time completion_of(const Measurement& m) {
   return scan == nullptr ? stamp_of(m) : end_of(*scan);
 }
 
-Time end_of(const LidarScan& scan) {
-  std::int32_t last = scan.points.empty() ? 0 : scan.points.front().offset_ns;
-  for (const LidarPoint& p : scan.points) last = std::max(last, p.offset_ns);
-  return scan.t + Duration(last);
-}
-
-Time begin_of(const LidarScan& scan) {
-  std::int32_t first = scan.points.empty() ? 0 : scan.points.front().offset_ns;
-  for (const LidarPoint& p : scan.points) first = std::min(first, p.offset_ns);
-  return scan.t + Duration(first);
-}
-
 bool ReorderBuffer::is_later(const Entry& a, const Entry& b) {
   return std::tuple(a.completion, a.measurement.index(), a.arrival) > std::tuple(b.completion, b.measurement.index(), b.arrival);
 }

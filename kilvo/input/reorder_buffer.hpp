@@ -11,9 +11,6 @@ namespace kilvo {
 
 /// When a measurement is complete: a scan at its last point, anything else at its stamp.
 Time completion_of(const Measurement& m);
-/// When the first and when the last point of a scan were taken.
-Time begin_of(const LidarScan& scan);
-Time end_of(const LidarScan& scan);
 
 class ReorderBuffer {
  public:

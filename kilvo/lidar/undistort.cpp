@@ -165,11 +165,16 @@ std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajec
   const Time first = std::max(trajectory.oldest() - slack, scan.t - std::chrono::seconds(3));
   const Time last = std::min(trajectory.newest() + slack, scan.t + std::chrono::seconds(3));
   const std::int64_t lowest = (first - scan.t).count(), highest = (last - scan.t).count();
-  std::int64_t earliest = highest, latest = lowest;
-  for (const LidarPoint& p : scan.points) {
-    const bool within = p.offset_ns >= lowest && p.offset_ns <= highest;
-    earliest = within && p.offset_ns < earliest ? p.offset_ns : earliest;
-    latest = within && p.offset_ns > latest ? p.offset_ns : latest;
+  const OffsetRange all = offsets_of(scan);
+  std::int64_t earliest = all.first, latest = all.last;
+  if (earliest < lowest || latest > highest) {
+    earliest = highest;
+    latest = lowest;
+    for (const LidarPoint& p : scan.points) {
+      const bool within = p.offset_ns >= lowest && p.offset_ns <= highest;
+      earliest = within && p.offset_ns < earliest ? p.offset_ns : earliest;
+      latest = within && p.offset_ns > latest ? p.offset_ns : latest;
+    }
   }
   if (highest < lowest || latest < earliest) {
     drops.outside_trajectory += static_cast<std::uint32_t>(scan.points.size());

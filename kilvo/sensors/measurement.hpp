@@ -2,9 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -37,11 +39,29 @@ struct LidarPoint {
   std::int32_t offset_ns = 0;  // time of this point minus LidarScan::t
 };
 
+/// Of the points of a scan: its first and its last offset.
+struct OffsetRange {
+  std::int32_t first = 0, last = 0;  // ns
+};
+
 /// One LiDAR message. Points need not be sorted by time, may be non-finite or at the origin: the estimator drops and counts those.
 struct LidarScan {
   Time t{};  // the time that the points' offsets refer to
   std::vector<LidarPoint> points;
+  std::optional<OffsetRange> offsets = {};  // of these points, once they have been looked at
 };
+
+inline OffsetRange offsets_of(const LidarScan& scan) {
+  if (scan.offsets) return *scan.offsets;
+  if (scan.points.empty()) return {};
+  OffsetRange out{scan.points.front().offset_ns, scan.points.front().offset_ns};
+  for (const LidarPoint& p : scan.points) out = {std::min(out.first, p.offset_ns), std::max(out.last, p.offset_ns)};
+  return out;
+}
+
+/// When the first and when the last point of a scan were taken.
+inline Time begin_of(const LidarScan& scan) { return scan.t + Duration(offsets_of(scan).first); }
+inline Time end_of(const LidarScan& scan) { return scan.t + Duration(offsets_of(scan).last); }
 
 struct CameraImage {
   Time t{};

@@ -41,7 +41,7 @@ bool is_mendable(const Finding& finding) {
 // Most descriptions are right, which a part of the points shows; what seems wrong, or does not show, is judged by all of them.
 // `earlier`: of these, when all is right.
 Diagnosis diagnosis_of(const Recorded& recorded, const Robot& robot, Earlier& earlier) {
-  constexpr std::size_t part = 3;
+  constexpr std::size_t part = 6;
   const Recorded few = thinned(recorded, part);
   Examination by_few(few, robot, std::move(earlier));
   const Diagnosis first = by_few.run();

@@ -56,9 +56,13 @@ std::size_t FileBytes::read_at(std::uint64_t offset, std::span<std::uint8_t> to)
 Bytes FileWindow::view(std::uint64_t offset, std::size_t count) {
   const bool held = offset >= begin_ && offset - begin_ <= held_ && held_ - (offset - begin_) >= count;
   if (!held) {
+    // After a jump little is read, for another may follow; while it goes on, more and more.
+    const bool goes_on = offset >= begin_ && offset - begin_ <= held_;
+    ahead_ = goes_on ? 2 * ahead_ : first_block_bytes;
     if (count > buffer_.size()) buffer_.resize(count);
+    ahead_ = std::clamp(ahead_, count, buffer_.size());
     begin_ = offset;
-    held_ = file_->read_at(offset, buffer_);
+    held_ = file_->read_at(offset, std::span(buffer_).first(ahead_));
   }
   const auto from = static_cast<std::size_t>(offset - begin_);
   return Bytes(buffer_).subspan(from, std::min(count, held_ - from));

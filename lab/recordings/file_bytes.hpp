@@ -54,6 +54,7 @@ class FileWindow {
   std::vector<std::uint8_t> buffer_;
   std::uint64_t begin_ = 0;  // of what the buffer holds
   std::size_t held_ = 0;
+  std::size_t ahead_ = 0;  // bytes that were read last
 };
 
 }  // namespace kilvo::lab
