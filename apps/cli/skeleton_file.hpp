@@ -29,7 +29,7 @@ class SkeletonFile {
   std::filesystem::path path_;
   SE3 T_IM_;  // the link that carries the IMU, in the IMU frame
   std::optional<std::array<JointChain, 2>> chains_;
-  std::vector<std::string> names_;  // of the messages that the chains' joints have been found in
+  JointNames names_;  // of the messages that the chains' joints have been found in
   bool found_ = false;
   std::unique_ptr<CsvFile> file_;
   std::optional<Time> last_;

@@ -39,6 +39,7 @@ struct Column {
 }  // namespace
 
 KILVO_WIDE void project_rows(const Covariance& P, const double* H, int rows, double* S, double* W) {
+  double of_row[at::size][most_rows] = {};  // W by rows
   for (int i = 0; i < rows; ++i) {
     const double* h = H + i * at::size;
     int touched[at::size], count = 0;
@@ -49,9 +50,15 @@ KILVO_WIDE void project_rows(const Covariance& P, const double* H, int rows, dou
       add(w, h[j], P.data() + j * at::size);
     }
     write(w, W + i * at::size);
-    for (int k = 0; k <= i; ++k) {
-      for (int n = 0; n < count; ++n) S[k * rows + i] += h[touched[n]] * W[k * at::size + touched[n]];
+    for (int j = 0; j < at::size; ++j) of_row[j][i] = W[i * at::size + j];
+    double s[most_rows] = {};
+    for (int k = 0; k <= i; ++k) s[k] = S[k * rows + i];
+    for (int first = 0; first <= i; first += lanes) {
+      Pack sum = *reinterpret_cast<const Pack*>(s + first);
+      for (int n = 0; n < count; ++n) sum += h[touched[n]] * *reinterpret_cast<const Pack*>(&of_row[touched[n]][first]);
+      *reinterpret_cast<Pack*>(s + first) = sum;
     }
+    for (int k = 0; k <= i; ++k) S[k * rows + i] = s[k];
   }
 }
 

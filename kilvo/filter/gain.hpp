@@ -12,7 +12,11 @@
 
 namespace kilvo {
 
-/// W = P H' and the lower triangle of S += H W; of H (`rows` by at::size, row-major) zeros cost nothing. W and S are column-major.
+/// Rows of a Gain, or of a prediction.
+inline constexpr int most_rows = 16;
+
+/// W = P H' and the lower triangle of S += H W; of H (`rows` by at::size, row-major, at most most_rows) zeros cost nothing. W and S are
+/// column-major.
 void project_rows(const Covariance& P, const double* H, int rows, double* S, double* W);
 
 /// How many rows a model may return.
@@ -29,6 +33,8 @@ void reduce(const Covariance& P, const double* W, int rows, Covariance& out);
 /// S = H P H' + R = L L', W = P H' L^-T: the gain is W L^-1 and the posterior covariance P - W W', symmetric by construction.
 template <int Max>
 class Gain {
+  static_assert(Max <= most_rows);
+
  public:
   using Columns = Eigen::Matrix<double, at::size, Eigen::Dynamic, 0, at::size, Max>;
   using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, Max, Max>;

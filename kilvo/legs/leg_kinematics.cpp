@@ -23,12 +23,12 @@ struct LegKinematics::Chains {
   SE3 T_IL;  // the IMU's link in the IMU frame
   LegsMount mount;
   std::array<JointChain, 2> legs;
-  std::vector<std::string> message_names;  // that the places are for
+  JointNames message_names;  // that the places are for
   // For messages without velocities.
   std::vector<double> last_position, velocity;
   Time last_t{};
 
-  std::optional<std::string> look_up_joints(const std::vector<std::string>& names);
+  std::optional<std::string> look_up_joints(const JointNames& names);
   const std::vector<double>* velocity_of(const JointSample& s);  // nullptr: not known
   FootPose pose_of(std::size_t side, const JointSample& s, const std::vector<double>& velocity);
   std::optional<Eigen::Vector3d> force_on(std::size_t side, const JointSample& s);
@@ -36,11 +36,11 @@ struct LegKinematics::Chains {
 };
 
 // Where in a message of these names each joint is.
-std::optional<std::string> LegKinematics::Chains::look_up_joints(const std::vector<std::string>& names) {
+std::optional<std::string> LegKinematics::Chains::look_up_joints(const JointNames& names) {
   if (names == message_names) return std::nullopt;
   for (JointChain& leg : legs) {
     if (const auto missing = leg.look_up(names)) {
-      message_names.clear();
+      message_names = {};
       return joint_is_missing(*missing);
     }
   }

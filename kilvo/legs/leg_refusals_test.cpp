@@ -66,7 +66,9 @@ TEST(LegKinematics, MessagesOfAnotherRobotAreToldFromDamagedOnes) {
   EXPECT_EQ(legs.mismatch(s), std::nullopt);
   s.position[2] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(legs.mismatch(s), std::nullopt) << "a bad value is not another robot";
-  s.names[static_cast<std::size_t>(std::ranges::find(s.names, "left_3") - s.names.begin())] = "tail";
+  JointNames::List names = s.names;
+  *std::ranges::find(names, "left_3") = "tail";
+  s.names = names;
   EXPECT_THAT(legs.mismatch(s).value_or(""), AllOf(HasSubstr("left_3"), HasSubstr("locked_joints")));
 }
 

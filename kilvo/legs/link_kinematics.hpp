@@ -38,7 +38,7 @@ class LinkKinematics {
 
   JointChain chain_;
   SE3 T_IM_;  // the link that carries the IMU, in the IMU frame
-  std::vector<std::string> message_names_;
+  JointNames message_names_;
   std::vector<double> zeros_;
   bool known_ = false;  // the joints are in messages of these names
 };

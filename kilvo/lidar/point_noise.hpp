@@ -7,15 +7,7 @@
 
 namespace kilvo {
 
-/// `beam`: from the LiDAR to the point, m, any frame; the covariance (m^2) is in the same frame.
-inline Eigen::Matrix3d point_noise(const Eigen::Vector3d& beam, const LidarConfig& config) {
-  const double range2 = beam.squaredNorm();
-  const double across = config.angle_noise * config.angle_noise * range2;
-  const double along = config.range_noise * config.range_noise;
-  return across * Eigen::Matrix3d::Identity() + ((along - across) / range2) * beam * beam.transpose();
-}
-
-/// n' C n of the same covariance, without building it.
+/// n' C n along a unit vector n of that covariance C, m^2. `beam`: from the LiDAR to the point, m, same frame as n.
 inline double point_noise_along(const Eigen::Vector3d& n, const Eigen::Vector3d& beam, const LidarConfig& config) {
   const double range2 = beam.squaredNorm();
   const double cosine2 = n.dot(beam) * n.dot(beam) / range2;

@@ -236,34 +236,4 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   return info;
 }
 
-namespace {
-
-// R S R', symmetric to the bit.
-Eigen::Matrix3d rotated(const Eigen::Matrix3d& R, const Eigen::Matrix3d& S) {
-  const Eigen::Matrix3d T = R * S;
-  Eigen::Matrix3d out;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = i; j < 3; ++j) out(i, j) = out(j, i) = T(i, 0) * R(j, 0) + T(i, 1) * R(j, 1) + T(i, 2) * R(j, 2);
-  }
-  return out;
-}
-
-}  // namespace
-
-std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL,
-                                 const LidarConfig& config) {
-  std::vector<PointGroup> groups(clusters.size());
-  const Eigen::Matrix3d& R = T_WI.R.matrix();
-  for (std::size_t i = 0; i < clusters.size(); ++i) {
-    const PointCluster& c = clusters[i];
-    PointGroup& g = groups[i];
-    const Eigen::Vector3d p_I = c.mean.cast<double>();
-    g.mean = T_WI * p_I;
-    g.count = static_cast<double>(c.count);
-    g.scatter = rotated(R, c.scatter_matrix().cast<double>());
-    g.noise = point_noise(R * (p_I - p_IL), config);
-  }
-  return groups;
-}
-
 }  // namespace kilvo

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "kilvo/filter/update.hpp"
-#include "kilvo/lidar/point_noise.hpp"
 #include "tests/helpers/exact_map.hpp"
+#include "tests/helpers/point_noise.hpp"
 #include "tests/helpers/random_state.hpp"
 
 namespace kilvo {
@@ -202,19 +202,24 @@ TEST(LidarModel, TheInformationByEpochAddsUpToAll) {
 
 TEST(ToWorld, GroupsAreTheClustersSeenFromTheWorld) {
   test::Random random(5);
-  PointCluster c;
-  c.mean = {3, 1, -2};
-  c.count = 5;
-  c.scatter << 1, 0.1F, 0.2F, 2, 0.3F, 3;
+  std::vector<PointCluster> clusters(7);  // four together, and three
+  for (PointCluster& c : clusters) {
+    c.mean = random.vector3(5).cast<float>();
+    c.count = static_cast<float>(random.uniform(1, 9));
+    for (int i = 0; i < 6; ++i) c.scatter[i] = static_cast<float>(random.normal(1));
+  }
   const SE3 T_WI{random.rotation(), random.vector3(10)};
   const Eigen::Vector3d p_IL(0.1, 0.2, 0.3);
-  const auto groups = to_world(std::vector<PointCluster>{c}, T_WI, p_IL, {});
-  ASSERT_EQ(groups.size(), 1U);
-  EXPECT_LT((groups[0].mean - T_WI * Eigen::Vector3d(3, 1, -2)).norm(), 1e-12);
-  EXPECT_LT((groups[0].scatter - T_WI.R.matrix() * c.scatter_matrix().cast<double>() * T_WI.R.matrix().transpose()).norm(), 1e-12);
-  const Eigen::Vector3d beam_W = T_WI.R * (Eigen::Vector3d(3, 1, -2) - p_IL);
-  EXPECT_LT((groups[0].noise - point_noise(beam_W, {})).norm(), 1e-15);
-  EXPECT_EQ(groups[0].count, 5);
+  const auto groups = to_world(clusters, T_WI, p_IL, {});
+  ASSERT_EQ(groups.size(), clusters.size());
+  const Eigen::Matrix3d& R = T_WI.R.matrix();
+  for (std::size_t i = 0; i < clusters.size(); ++i) {
+    const Eigen::Vector3d mean = clusters[i].mean.cast<double>();
+    EXPECT_LT((groups[i].mean - T_WI * mean).norm(), 1e-12) << i;
+    EXPECT_LT((groups[i].scatter - R * clusters[i].scatter_matrix().cast<double>() * R.transpose()).norm(), 1e-12) << i;
+    EXPECT_LT((groups[i].noise - test::point_noise(T_WI.R * (mean - p_IL), {})).norm(), 1e-15) << i;
+    EXPECT_EQ(groups[i].count, static_cast<double>(clusters[i].count)) << i;
+  }
 }
 
 }  // namespace point_to_plane_test

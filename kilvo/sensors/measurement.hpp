@@ -7,11 +7,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <variant>
 #include <vector>
 
 #include "kilvo/sensors/image.hpp"
+#include "kilvo/sensors/joint_names.hpp"
 #include "kilvo/sensors/time.hpp"
 
 namespace kilvo {
@@ -27,7 +27,7 @@ struct ImuSample {
 /// Joint encoders (or the two-feet message, whose six positions and velocities come without names).
 struct JointSample {
   Time t{};
-  std::vector<std::string> names;
+  JointNames names;
   std::vector<double> position;  // rad
   std::vector<double> velocity;  // rad/s, may be empty
   std::vector<double> effort;    // N m, may be empty

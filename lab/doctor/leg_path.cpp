@@ -16,8 +16,9 @@ std::vector<LegPose> RecordedLegs::path(const Robot& robot, const LegHypothesis*
   of_link.imu.T_link_imu = SE3{};  // the IMU's mount is what shall be judged
   if (hypothesis != nullptr && hypothesis->robot) hypothesis->robot(of_link);
   JointSample sample;
-  sample.names = recorded_.joint_names;
-  if (hypothesis != nullptr && hypothesis->names) hypothesis->names(sample.names);
+  JointNames::List names = recorded_.joint_names;
+  if (hypothesis != nullptr && hypothesis->names) hypothesis->names(names);
+  sample.names = std::move(names);
   try {
     LegKinematics legs = kinematics(of_link);
     double last = -1e9;

@@ -43,7 +43,7 @@ void Recorder::take(const JointSample& sample) {
   if (t - last_leg_ < leg_period && (t >= last_leg_ || (recorded_.leg_clock_is_found && t > last_leg_ - leg_step))) return;
   if (!std::ranges::all_of(sample.position, [](double q) { return std::isfinite(q); })) return;
   if (recorded_.joint_names.empty()) recorded_.joint_names = sample.names;
-  if (sample.names != recorded_.joint_names) {
+  if (sample.names.list() != recorded_.joint_names) {
     recorded_.joint_names_change = true;
     return;
   }

@@ -1,5 +1,7 @@
 #include "lab/messages/inertial_and_joints.hpp"
 
+#include <algorithm>
+
 #include "lab/messages/ros_types.hpp"
 #include "lab/messages/wire_reader.hpp"
 
@@ -13,10 +15,12 @@ Decoded<ImuSample> decode_imu(const WireMessage& message) {
   return ImuSample{m->header.stamp, {w.x, w.y, w.z}, {a.x, a.y, a.z}};
 }
 
-Decoded<JointSample> decode_joint_state(const WireMessage& message) {
+Decoded<JointSample> decode_joint_state(const WireMessage& message, const JointNames& known) {
   const auto m = read_message<JointStateMessage>(message);
   if (!m) return DecodeError{m.reason()};
-  return JointSample{m->header.stamp, {m->names.begin(), m->names.end()}, m->position.values(), m->velocity.values(), m->effort.values()};
+  const bool same = std::ranges::equal(m->names, known);
+  return JointSample{m->header.stamp, same ? known : JointNames(JointNames::List(m->names.begin(), m->names.end())), m->position.values(),
+                     m->velocity.values(), m->effort.values()};
 }
 
 }  // namespace kilvo::lab

@@ -58,7 +58,7 @@ std::vector<Sensor> sensors_of_type(std::string_view type) {
 }
 
 Decoded<DecodedMeasurement> decode_measurement(Sensor sensor, std::string_view type, const WireMessage& message,
-                                               const PointTimeFormat& point_time, bool with_colours) {
+                                               const PointTimeFormat& point_time, bool with_colours, const JointNames& known) {
   if (!is_type_of(sensor, type)) return DecodeError{std::string(type) + " is not read for the sensor " + name_of(sensor)};
   if (type == hg_low_state) return part(sensor, decode_hg_low_state(message));
   if (type == go_low_state) return part(sensor, decode_go_low_state(message));
@@ -66,7 +66,7 @@ Decoded<DecodedMeasurement> decode_measurement(Sensor sensor, std::string_view t
     case Sensor::imu:
       return plain(type == hg_imu_state ? decode_hg_imu_state(message) : decode_imu(message));
     case Sensor::legs:
-      return plain(decode_joint_state(message));
+      return plain(decode_joint_state(message, known));
     case Sensor::lidar:
       return timed(type == cloud_type ? decode_point_cloud2(message, point_time) : decode_livox(message, point_time));
     case Sensor::camera:

@@ -24,10 +24,10 @@ struct DecodedMeasurement {
   std::optional<std::uint32_t> tick = {};    // ms, wraps around: what a LowState has in place of a stamp
 };
 
-/// What a message says of one sensor; `point_time` matters for LiDAR types only, `with_colours` for images. The error says why there is
-/// nothing.
+/// What a message says of one sensor; `point_time` matters for LiDAR types only, `with_colours` for images, `known`, the
+/// names that messages before had, for joints. The error says why there is nothing.
 Decoded<DecodedMeasurement> decode_measurement(Sensor sensor, std::string_view type, const WireMessage& message,
-                                               const PointTimeFormat& point_time, bool with_colours = true);
+                                               const PointTimeFormat& point_time, bool with_colours = true, const JointNames& known = {});
 
 /// For all LiDAR message types.
 Decoded<CloudTimes> observe_cloud(std::string_view type, const WireMessage& message);

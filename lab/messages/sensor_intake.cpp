@@ -13,7 +13,7 @@ Time& stamp_in(Measurement& measurement) {
 
 std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view type, const WireMessage& message, Time arrived,
                                               const PointTimeFormat& point_time) {
-  auto decoded = decode_measurement(sensor, type, message, point_time, with_colours_);
+  auto decoded = decode_measurement(sensor, type, message, point_time, with_colours_, joint_names_);
   if (!decoded) {
     newest_fault_ = decoded.reason();
     if (first_fault_.empty()) first_fault_ = newest_fault_;
@@ -24,6 +24,7 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
   tick_ = decoded->tick;
   gyro_ = decoded->gyro;
   counts_.absurd_point_times += decoded->absurd_times;
+  if (const auto* joints = std::get_if<JointSample>(&decoded->measurement)) joint_names_ = joints->names;
   Time& stamp = stamp_in(decoded->measurement);
   if (stamp == Time{}) {
     // A driver that does not stamp, as some do not their joints: the time of arrival is the best there is.

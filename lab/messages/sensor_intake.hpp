@@ -52,6 +52,7 @@ class SensorIntake {
  private:
   double time_offset_;
   bool with_colours_;
+  JointNames joint_names_;  // of the message that was taken last
   SensorCounts counts_;
   std::string first_fault_, newest_fault_;
   std::optional<std::uint32_t> tick_;

@@ -54,16 +54,18 @@ Decoded<JointSample> joints_of(const HgLowStateMessage& m) {
                        " is no robot whose order of joints is known (G1: 1 to 6)"};
   JointSample joints;
   joints.t = time_from_ns(std::int64_t{m.tick} * 1'000'000);
-  joints.names.reserve(g1_joints.size());
+  JointNames::List names;
+  names.reserve(g1_joints.size());
   for (std::vector<double>* values : {&joints.position, &joints.velocity, &joints.effort}) values->reserve(g1_joints.size());
   for (std::size_t i = 0; i < g1_joints.size(); ++i) {
     if (std::ranges::find(*empty, i) != empty->end()) continue;
     const HgMotorMessage& motor = m.motor_state[i];
-    joints.names.emplace_back(g1_joints[i]);
+    names.emplace_back(g1_joints[i]);
     joints.position.push_back(static_cast<double>(motor.q));
     joints.velocity.push_back(static_cast<double>(motor.dq));
     joints.effort.push_back(static_cast<double>(motor.tau_est));
   }
+  joints.names = std::move(names);
   return joints;
 }
 

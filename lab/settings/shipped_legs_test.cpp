@@ -19,12 +19,14 @@ class ShippedG1 : public testing::TestWithParam<const char*> {};
 TEST_P(ShippedG1, HasFeetThatAreMirrorImagesAtZeroJoints) {
   const Robot robot = shipped(GetParam());
   LegKinematics legs(robot);
-  JointSample s;
+  JointNames::List names;
   for (const char* side : {"left", "right"}) {
     for (const char* joint : {"hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll"}) {
-      s.names.push_back(std::string(side) + "_" + joint + "_joint");
+      names.push_back(std::string(side) + "_" + joint + "_joint");
     }
   }
+  JointSample s;
+  s.names = names;
   s.position.assign(12, 0.0);
   s.velocity.assign(12, 0.0);
   auto known = legs.feet(s);

@@ -140,8 +140,8 @@ JointSample Simulator::joints_at(double t) {
   JointSample out;
   const Wear::Encoders shown = wear_.encoders(t, rates, efforts);
   out.t = wear_.joint_stamp(stamp(Sensor::legs, t));
+  out.names = joint_names_;
   for (std::size_t i = 0; i < angles.size(); ++i) {
-    out.names.push_back(joint_names()[i]);
     const double noisy = angles[i] + shown.angle[i] + joint_offsets_[i] + m.position_noise * random.gaussian();
     out.position.push_back(m.resolution > 0 ? std::round(noisy / m.resolution) * m.resolution : noisy);
     out.velocity.push_back(rates[i] + shown.velocity[i] + m.velocity_noise * random.gaussian());

@@ -5,6 +5,7 @@
 #include <queue>
 
 #include "kilvo/sensors/measurement_source.hpp"
+#include "lab/simulation/biped.hpp"
 #include "lab/simulation/camera_sensor.hpp"
 #include "lab/simulation/lidar_sensor.hpp"
 #include "lab/simulation/random.hpp"
@@ -80,6 +81,7 @@ class Simulator final : public MeasurementSource {
   std::vector<Random> random_;  // by Sensor
   Eigen::Vector3d gyro_bias_, accel_bias_;
   JointAngles joint_offsets_{};
+  JointNames joint_names_ = JointNames::List(joint_names().begin(), joint_names().end());
   Time arrived_{}, measured_{};
   std::optional<Measurement> again_;  // comes a second time
   ImuTruth imu_truth_{};

@@ -61,13 +61,15 @@ inline Robot biped(Random& random) {
 
 inline JointSample random_joints(Random& random) {
   JointSample s;
+  JointNames::List names;
   s.t = time_from_ns(1'700'000'000'000'000'000);
   for (const BipedJoint& j : biped_joints()) {
     if (j.type == "fixed") continue;
-    s.names.push_back(j.name);
+    names.push_back(j.name);
     s.position.push_back(random.normal(0.5));
     s.velocity.push_back(random.normal(1));
   }
+  s.names = names;
   return s;
 }
 
