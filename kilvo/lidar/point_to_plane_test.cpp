@@ -124,7 +124,7 @@ TEST(LidarModel, WithNoiseAsConfiguredTheResidualsAreOfUnitVariance) {
   const LidarConfig lidar;
   for (PointXYZI& p : points) {
     const Eigen::Vector3d beam = p.head<3>().cast<double>();
-    const Eigen::Matrix3d L = point_noise(beam, lidar).llt().matrixL();
+    const Eigen::Matrix3d L = test::point_noise(beam, lidar).llt().matrixL();
     p.head<3>() += (L * random.vector3()).cast<float>();
   }
   const Registered r = register_scan(map, points, truth_state(), 1, lidar);

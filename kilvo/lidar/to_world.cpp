@@ -1,6 +1,5 @@
 // The clusters of a sweep as groups of points in the world, four at a time.
-#include <array>
-#include <cstddef>
+#include <algorithm>
 
 #include "kilvo/lidar/point_to_plane.hpp"
 
@@ -9,71 +8,64 @@ namespace {
 
 using Double4 = double __attribute__((vector_size(32)));
 
-// By row and column; of four clusters each.
-using Vector4 = std::array<Double4, 3>;
-using Symmetric4 = std::array<Double4, 6>;  // xx xy xz yy yz zz
-
-constexpr std::array<std::array<std::size_t, 3>, 3> place{{{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}};  // in a Symmetric4
-
-struct Pose4 {
-  std::array<std::array<double, 3>, 3> R;
-  std::array<double, 3> p, p_IL;
-  double along, angle_variance;  // of range_noise and angle_noise
+// Of four clusters each; the symmetric one as xx xy xz yy yz zz.
+struct Vector4 {
+  Double4 at[3];
+};
+struct Symmetric4 {
+  Double4 at[6];
+  [[gnu::always_inline]] Double4& operator()(int i, int j) { return at[i + j + (i > 0 && j > 0 ? 1 : 0)]; }
 };
 
-[[gnu::always_inline]] inline void rotate(const Pose4& to, const Vector4& x, Vector4& out) {
-  for (std::size_t i = 0; i < 3; ++i) out[i] = to.R[i][0] * x[0] + (to.R[i][1] * x[1] + to.R[i][2] * x[2]);
+[[gnu::always_inline]] inline void rotate(const Eigen::Matrix3d& R, const Vector4& x, Vector4& out) {
+  for (int i = 0; i < 3; ++i) out.at[i] = R(i, 0) * x.at[0] + (R(i, 1) * x.at[1] + R(i, 2) * x.at[2]);
 }
 
 // R S R'
-[[gnu::always_inline]] inline void rotate(const Pose4& to, const Symmetric4& S, Symmetric4& out) {
-  for (std::size_t i = 0; i < 3; ++i) {
-    Vector4 T;
-    for (std::size_t j = 0; j < 3; ++j) T[j] = to.R[i][0] * S[place[0][j]] + (to.R[i][1] * S[place[1][j]] + to.R[i][2] * S[place[2][j]]);
-    for (std::size_t j = i; j < 3; ++j) out[place[i][j]] = T[0] * to.R[j][0] + T[1] * to.R[j][1] + T[2] * to.R[j][2];
+[[gnu::always_inline]] inline void rotate(const Eigen::Matrix3d& R, Symmetric4& S, Symmetric4& out) {
+  for (int i = 0; i < 3; ++i) {
+    Double4 T[3];
+    for (int j = 0; j < 3; ++j) T[j] = R(i, 0) * S(0, j) + (R(i, 1) * S(1, j) + R(i, 2) * S(2, j));
+    for (int j = i; j < 3; ++j) out(i, j) = T[0] * R(j, 0) + T[1] * R(j, 1) + T[2] * R(j, 2);
   }
 }
 
 // Range noise along the beam, bearing noise across it, as in point_noise.hpp.
-[[gnu::always_inline]] inline void noise_of(const Pose4& to, const Vector4& beam, Symmetric4& out) {
-  const Double4 range2 = beam[0] * beam[0] + (beam[1] * beam[1] + beam[2] * beam[2]);
-  const Double4 across = to.angle_variance * range2, more = (to.along - across) / range2;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = i; j < 3; ++j) out[place[i][j]] = more * beam[i] * beam[j];
-    out[place[i][i]] += across;
+[[gnu::always_inline]] inline void noise_of(const Vector4& beam, const LidarConfig& config, Symmetric4& out) {
+  const Double4* b = beam.at;
+  const Double4 range2 = b[0] * b[0] + (b[1] * b[1] + b[2] * b[2]), across = config.angle_noise * config.angle_noise * range2;
+  const Double4 more = (config.range_noise * config.range_noise - across) / range2;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j) out(i, j) = more * b[i] * b[j];
+    out(i, i) += across;
   }
 }
 
-[[gnu::always_inline]] inline void write(const Symmetric4& from, std::size_t lane, Eigen::Matrix3d& to) {
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    for (Eigen::Index j = i; j < 3; ++j) to(i, j) = to(j, i) = from[place[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)]][lane];
-  }
-}
-
-constexpr std::size_t at_once = 4;
-
-KILVO_WIDE void move(const PointCluster* from, std::size_t count, const Pose4& pose, PointGroup* to) {
-  for (std::size_t first = 0; first < count; first += at_once) {
-    const std::size_t n = count - first < at_once ? count - first : at_once;
-    Vector4 mean{}, beam;
-    Symmetric4 scatter{}, turned, noise;
-    for (std::size_t k = 0; k < at_once; ++k) {
-      const PointCluster& c = from[first + (k < n ? k : 0)];
-      for (std::size_t i = 0; i < 3; ++i) mean[i][k] = static_cast<double>(c.mean[static_cast<Eigen::Index>(i)]);
-      for (std::size_t i = 0; i < 6; ++i) scatter[i][k] = static_cast<double>(c.scatter[static_cast<Eigen::Index>(i)]);
+KILVO_WIDE void move(std::span<const PointCluster> from, const SE3& T_WI, const Eigen::Vector3d& p_IL, const LidarConfig& config,
+                     PointGroup* to) {
+  for (; !from.empty(); from = from.subspan(std::min<std::size_t>(4, from.size()))) {
+    const int n = static_cast<int>(std::min<std::size_t>(4, from.size()));
+    Vector4 mean, at, beam_I, beam;
+    Symmetric4 scatter, turned, noise;
+    for (int k = 0; k < 4; ++k) {
+      const PointCluster& c = from[k < n ? static_cast<std::size_t>(k) : 0];
+      for (int i = 0; i < 3; ++i) mean.at[i][k] = static_cast<double>(c.mean[i]);
+      for (int i = 0; i < 6; ++i) scatter.at[i][k] = static_cast<double>(c.scatter[i]);
     }
-    Vector4 beam_I, at;
-    for (std::size_t i = 0; i < 3; ++i) beam_I[i] = mean[i] - pose.p_IL[i];
-    rotate(pose, beam_I, beam);
-    noise_of(pose, beam, noise);
-    rotate(pose, scatter, turned);
-    rotate(pose, mean, at);
-    for (std::size_t k = 0; k < n; ++k) {
-      PointGroup& g = to[first + k];
-      for (std::size_t i = 0; i < 3; ++i) g.mean[static_cast<Eigen::Index>(i)] = at[i][k] + pose.p[i];
-      g.count = static_cast<double>(from[first + k].count);
-      write(turned, k, g.scatter);
-      write(noise, k, g.noise);
+    for (int i = 0; i < 3; ++i) beam_I.at[i] = mean.at[i] - p_IL[i];
+    rotate(T_WI.R.matrix(), beam_I, beam);
+    noise_of(beam, config, noise);
+    rotate(T_WI.R.matrix(), scatter, turned);
+    rotate(T_WI.R.matrix(), mean, at);
+    for (int k = 0; k < n; ++k, ++to) {
+      to->count = static_cast<double>(from[static_cast<std::size_t>(k)].count);
+      for (int i = 0; i < 3; ++i) {
+        to->mean[i] = at.at[i][k] + T_WI.p[i];
+        for (int j = 0; j < 3; ++j) {
+          to->scatter(i, j) = turned(i, j)[k];
+          to->noise(i, j) = noise(i, j)[k];
+        }
+      }
     }
   }
 }
@@ -83,14 +75,7 @@ KILVO_WIDE void move(const PointCluster* from, std::size_t count, const Pose4& p
 std::vector<PointGroup> to_world(std::span<const PointCluster> clusters, const SE3& T_WI, const Eigen::Vector3d& p_IL,
                                  const LidarConfig& config) {
   std::vector<PointGroup> groups(clusters.size());
-  Pose4 pose{{}, {}, {}, config.range_noise * config.range_noise, config.angle_noise * config.angle_noise};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    pose.p[i] = T_WI.p[row];
-    pose.p_IL[i] = p_IL[row];
-    for (std::size_t j = 0; j < 3; ++j) pose.R[i][j] = T_WI.R.matrix()(row, static_cast<Eigen::Index>(j));
-  }
-  move(clusters.data(), clusters.size(), pose, groups.data());
+  move(clusters, T_WI, p_IL, config, groups.data());
   return groups;
 }
 

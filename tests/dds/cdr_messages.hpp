@@ -49,7 +49,7 @@ inline RawMessage imu_message(const ImuSample& s) {
 inline RawMessage joint_state_message(const JointSample& s) {
   CdrBuffer out;
   put_header(out.cdr(), s.t, "");
-  out.cdr() << s.names << s.position << s.velocity << s.effort;
+  out.cdr() << s.names.list() << s.position << s.velocity << s.effort;
   return out.message();
 }
 
