@@ -143,7 +143,7 @@ void Findings::report_use(const Use& before, const Situation& now) {
   const std::uint64_t refused = drops_[lidar][nowhere] - before.dropped[lidar][nowhere];
   if (!statistics_.diverged && refused > few && refused > statistics_.sensors[lidar].used - before.used[lidar]) {
     contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar, now), static_cast<double>(refused),
-               "most sweeps did not fit the map where they should have been", now);
+               "most sweeps did not fit the map at the predicted pose", now);
   }
   if (events_.all() != statistics_.events) statistics_.events = events_.all();
 }
@@ -159,7 +159,7 @@ void Findings::report_new_map(const Situation& now) {
   ++statistics_.maps_begun_anew;
   report(now, Sensor::lidar, Reason::map_begun_anew);
   contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar, now), 2,
-             "for 2 s no sweep fitted the map where it should have been", now);
+             "for 2 s no sweep fitted the map at the predicted pose", now);
 }
 
 Sensor Findings::witness_against(Sensor s, const Situation& now) {
@@ -179,7 +179,7 @@ void Findings::judge_stances(const Situation& now) {
   lost_stances_before_ = statistics_.lost_stances;
   if (lost >= most_lost_stances && !statistics_.diverged)
     contradict(Reason::diverged, Sensor::legs, has_lidar(now.modality) ? Sensor::lidar : Sensor::imu, static_cast<double>(lost),
-               "for seconds no foot seemed to stand still, and the velocity was given up " + std::to_string(lost) + " times in 10 s", now);
+               "for seconds no foot was at rest, and the velocity was reset " + std::to_string(lost) + " times in 10 s", now);
 }
 
 void Findings::judge_speed(const Situation& now) {
@@ -187,7 +187,7 @@ void Findings::judge_speed(const Situation& now) {
   const double sigma = std::sqrt(std::max(0.0, now.estimate.P.diagonal().segment<3>(at::v).maxCoeff()));
   if (speed < limit || sigma > 0.3 * speed || statistics_.diverged) return;
   contradict(Reason::diverged, Sensor::imu, has_lidar(now.modality) ? Sensor::lidar : Sensor::legs, speed,
-             "together they say a speed of " + decimals(speed, 1) + " m/s", now);
+             "together they give a speed of " + decimals(speed, 1) + " m/s", now);
 }
 
 void Findings::judge_biases(const Situation& now) {
@@ -208,7 +208,7 @@ void Findings::judge_biases(const Situation& now) {
   const Biases& before = impossible ? *first_biases_ : *known_biases_;
   const double accel = (present.accel - before.accel).norm();
   const std::string why = "the biases that would reconcile them have changed by " + decimals(accel, 2) + " m/s^2 and " +
-                          decimals((present.gyro - before.gyro).norm(), 3) + " rad/s: is the mount right?";
+                          decimals((present.gyro - before.gyro).norm(), 3) + " rad/s: check the mount";
   contradict(impossible ? Reason::diverged : Reason::inconsistent, Sensor::imu, has_lidar(now.modality) ? Sensor::lidar : Sensor::legs,
              accel, why, now);
 }
