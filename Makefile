@@ -7,7 +7,7 @@
 #   make bench      time the functions; RECORDINGS=DIR: time and judge whole recordings as well
 #   make tables     RECORDINGS=DIR: every modality on every recording, as Markdown
 #   make check      layout, modules, sizes, constants, headers, clang-tidy (files that changed since they last passed; ALL=1: every file)
-#   make golden     seventy runs must give the bytes of tests/golden/manifest.json (a refactoring changes none)
+#   make golden     eighty-two runs must give the bytes of tests/golden/manifest.json (a refactoring changes none)
 #   make format     rewrite the sources in the one layout
 #   make fuzz       fuzz the readers, SECONDS_EACH=60 each
 #   make install    into PREFIX=/usr/local

@@ -48,7 +48,7 @@ lab::OutputFormat format_of(const fs::path& out, const ConvertWords& words) {
     throw UsageError(fmt::format("convert: {}: no format is called {} (.bag, .mcap, .db3); --storage mcap writes a folder of that name",
                                  out.string(), out.extension().string()));
   if (!words.storage.empty()) {
-    if (!format.folder) throw UsageError("convert: --storage is for folders; the name of a file says its format");
+    if (!format.folder) throw UsageError("convert: --storage is for folders; the name of a file defines its format");
     format.storage =
         choose<Format::Storage>(words.storage, "--storage", {{"mcap", Format::Storage::mcap}, {"sqlite3", Format::Storage::db3}});
     if (format.storage == Format::Storage::db3) format.compression = Format::Compression::none;

@@ -28,7 +28,7 @@ void tell(const fs::path& folder, const fs::path& results, const lab::Evaluation
   const lab::Divergence judged = lab::judge_divergence(e);
   fmt::print("\nA humanoid (joints 1 kHz, IMU 200 Hz, LiDAR and camera 10 Hz) walked {:.1f} m through a simulated room in {:.0f} s.\n",
              e.path_length_m, e.duration_s);
-  fmt::print("KILVO estimated its way from the recording alone. {} Against the truth:\n",
+  fmt::print("KILVO estimated the trajectory from the recording alone. {} Against the truth:\n",
              judged.diverged ? "This is NOT as it should be." : "As it should be.");
   fmt::print("  position error      {:.1f} mm rms, {:.1f} mm at most; orientation {:.3f} degrees rms\n", 1e3 * e.ate_rmse_m,
              1e3 * e.ate_max_m, e.rotation_rmse_deg);

@@ -128,14 +128,14 @@ int info(const InfoOptions& options) {
 
 void add_info(CLI::App& program, Action& chosen) {
   auto options = std::make_shared<InfoOptions>();
-  CLI::App* verb = program.add_subcommand("info", "what is in a recording, and what it would be used for");
+  CLI::App* verb = program.add_subcommand("info", "content of a recording, and the use of each topic");
   verb->add_option(
           "INPUT", options->inputs,
           "a ROS 1 bag, an MCAP file, a .db3 or folder of rosbag2, or a folder with recording.bag in it; several are one recording")
       ->required()
       ->expected(1, -1);
   verb->add_option("--config", options->config,
-                   "configuration that says what topics are used for; default: config.yaml in INPUT if that is a folder, else the shipped "
+                   "configuration with the topics; default: config.yaml in INPUT if that is a folder, else the shipped "
                    "robots/g1.yaml")
       ->type_name("FILE");
   verb->callback([options, &chosen] { chosen = [options] { return info(*options); }; });

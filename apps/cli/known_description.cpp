@@ -148,7 +148,7 @@ std::string consequence(const KnownDescription& known, const std::vector<Sensor>
   for (const lab::Change& change : known.mended) keys.push_back(change.key);
   for (const Sensor sensor : left) names.push_back(name_of(sensor));
   std::string out = "; the results are";
-  if (!keys.empty()) out += fmt::format(" with {} mended", fmt::join(keys, ", "));
+  if (!keys.empty()) out += fmt::format(" with {} corrected", fmt::join(keys, ", "));
   if (left != used) out += fmt::format("{} of {} alone", keys.empty() ? "" : ",", fmt::join(names, ", "));
   return out;
 }

@@ -1,5 +1,5 @@
-// What a run does about a description that the data contradict: it begins anew with the settings that mend it, and without the senses
-// that nothing mends.
+// What a run does about a description that the data contradict: it restarts with the settings that correct it, and without the sensors
+// that no setting corrects.
 #pragma once
 
 #include <vector>
@@ -34,11 +34,11 @@ KnownDescription next_round(KnownDescription known, const std::vector<lab::Wrong
 /// The settings of this round.
 lab::Settings mended(const KnownDescription& known, const RunOptions& options, const std::filesystem::path& config);
 
-/// `used` without the senses that are described wrongly and not mended. A mount of the IMU on the robot concerns the legs alone; images
+/// `used` without the sensors that are described wrongly and not corrected. A mount of the IMU on the robot concerns the legs alone; images
 /// need the LiDAR's map. Empty: nothing is left to estimate with.
 std::vector<Sensor> sound(const std::vector<Sensor>& used, const KnownDescription& known);
 
-/// "; the results are with lidar.T_imu_lidar.R mended, of imu, legs alone"
+/// "; the results are with lidar.T_imu_lidar.R corrected, of imu, legs alone"
 std::string consequence(const KnownDescription& known, const std::vector<Sensor>& used, const std::vector<Sensor>& left);
 
 }  // namespace kilvo::cli

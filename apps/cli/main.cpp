@@ -59,7 +59,7 @@ int parse_and_do(const std::vector<std::string>& words) {
   }
   if (!chosen) {
     fmt::print(stderr, "{}", program.help());
-    throw UsageError("nothing to do: say a verb");
+    throw UsageError("nothing to do: name a verb");
   }
   return chosen();
 }

@@ -69,7 +69,7 @@ void add_run(CLI::App& program, Action& chosen) {
       ->type_name("SENSOR:T0-T1")
       ->allow_extra_args(false);
   verb->add_option("--degrade", words->degradations,
-                   "worsen what a sensor sees between two times: dark or blank images, scans of a narrow sector (dark:10-16), repeatable")
+                   "degrade a sensor's data between two times: dark or blank images, scans of a narrow sector (dark:10-16), repeatable")
       ->type_name("KIND:T0-T1")
       ->allow_extra_args(false);
   verb->add_option("--realtime", words->realtime, "play it through the live runner, so many times as fast as it was recorded (1)")
@@ -84,7 +84,7 @@ void add_run(CLI::App& program, Action& chosen) {
   verb->add_flag("--mcap", options.mcap, "write DIR/run.mcap too: poses, transforms, contacts, clouds, times, events, for Foxglove");
   verb->add_flag("--no-deskew", options.no_deskew, "take each cloud at its stamp, as if its points had been measured at once");
   verb->add_flag("--trust-description", options.trust_description,
-                 "do not hold the data against the description, which costs seconds; for runs on a recording that was judged before");
+                 "do not check the description against the data, which costs seconds; for runs on a recording that was checked before");
   verb->add_option("--threads", words->threads, "default: all cores; results do not depend on it")
       ->type_name("N")
       ->check(CLI::Range(1, 1024));

@@ -111,7 +111,7 @@ class Run {
   // A run with a wrong description has failed, however good it looks.
   void settle_description() {
     for (const lab::Change& c : known_.refined) facts_.warnings.push_back(fmt::format("calibration.online: {}: {}", c.key, c.value));
-    for (const lab::Change& c : known_.mended) facts_.warnings.push_back(fmt::format("begun anew with {}: {}", c.key, c.value));
+    for (const lab::Change& c : known_.mended) facts_.warnings.push_back(fmt::format("restarted with {}: {}", c.key, c.value));
     wrong_.insert(wrong_.begin(), known_.wrong.begin(), known_.wrong.end());
     for (const lab::WrongDescription& wrong : wrong_) {
       const lab::Finding& finding = wrong.finding;
@@ -285,7 +285,7 @@ int run_recording(const RunOptions& options) {
     if (known.round > 1) {
       facts.sensors = sound(choice.used, known);
       remove_results(options.out);
-      if (!options.quiet) fmt::print(stderr, "kilvo: the run begins anew{}\n", consequence(known, choice.used, facts.sensors));
+      if (!options.quiet) fmt::print(stderr, "kilvo: the run restarts{}\n", consequence(known, choice.used, facts.sensors));
     }
     fit_to_machine(settings, options.realtime.has_value(), options.threads);
     settings.estimator.sweep_points = options.with_map || options.mcap;

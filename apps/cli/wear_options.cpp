@@ -18,13 +18,12 @@ struct WearOption {
 };
 
 constexpr WearOption table[] = {
-    {"--sole-motion", "MM", "loaded soles give way by so much", milli, 0, 50,
-     [](SimulatorConfig& c) -> double& { return c.wear.sole_motion; }},
-    {"--shock", "M/S", "what encoders show of a touchdown, at the foot", 1, 0, 10,
+    {"--sole-motion", "MM", "compression of loaded soles", milli, 0, 50, [](SimulatorConfig& c) -> double& { return c.wear.sole_motion; }},
+    {"--shock", "M/S", "velocity of the foot that encoders show at a touchdown", 1, 0, 10,
      [](SimulatorConfig& c) -> double& { return c.wear.shock; }},
-    {"--impact", "M/S2", "how hard the torso rings at each touchdown", 1, 0, 200,
+    {"--impact", "M/S2", "amplitude of the torso's vibration at each touchdown", 1, 0, 200,
      [](SimulatorConfig& c) -> double& { return c.wear.impact; }},
-    {"--joint-flex", "DEG", "joints give way by so much under 100 N m", degree, 0, 10,
+    {"--joint-flex", "DEG", "compliance of the joints: deflection under 100 N m", degree, 0, 10,
      [](SimulatorConfig& c) -> double& { return c.wear.flex; }},
     {"--backlash", "DEG", "play of each joint", degree, 0, 5, [](SimulatorConfig& c) -> double& { return c.wear.backlash; }},
     {"--zero-offset", "DEG", "sigma of the encoders' zeros", degree, 0, 10,
@@ -34,12 +33,14 @@ constexpr WearOption table[] = {
     {"--velocity-lag", "MS", "low pass on the joint velocities", milli, 0, 100,
      [](SimulatorConfig& c) -> double& { return c.wear.velocity_lag; }},
     {"--stamp-jitter", "MS", "sigma of the joint stamps", milli, 0, 100, [](SimulatorConfig& c) -> double& { return c.wear.stamp_jitter; }},
-    {"--lost", "PERCENT", "of joint and IMU messages", percent, 0, 90, [](SimulatorConfig& c) -> double& { return c.wear.lost; }},
-    {"--repeated", "PERCENT", "of joint and IMU messages", percent, 0, 90, [](SimulatorConfig& c) -> double& { return c.wear.repeated; }},
-    {"--vibration", "M/S2", "rms of the torso while it walks, 45 to 90 Hz", 1, 0, 50,
+    {"--lost", "PERCENT", "joint and IMU messages that are lost", percent, 0, 90,
+     [](SimulatorConfig& c) -> double& { return c.wear.lost; }},
+    {"--repeated", "PERCENT", "joint and IMU messages that are repeated", percent, 0, 90,
+     [](SimulatorConfig& c) -> double& { return c.wear.repeated; }},
+    {"--vibration", "M/S2", "rms vibration of the torso while walking, 45 to 90 Hz", 1, 0, 50,
      [](SimulatorConfig& c) -> double& { return c.wear.vibration; }},
-    {"--leg-rate", "HZ", "of the joint messages", 1, 1, 4000, [](SimulatorConfig& c) -> double& { return c.joints.delivery.rate; }},
-    {"--imu-rate", "HZ", "of the IMU, without a filter before it", 1, 1, 4000,
+    {"--leg-rate", "HZ", "rate of the joint messages", 1, 1, 4000, [](SimulatorConfig& c) -> double& { return c.joints.delivery.rate; }},
+    {"--imu-rate", "HZ", "rate of the IMU, without an anti-aliasing filter", 1, 1, 4000,
      [](SimulatorConfig& c) -> double& { return c.imu.delivery.rate; }},
 };
 

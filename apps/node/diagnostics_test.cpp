@@ -96,13 +96,13 @@ TEST(Diagnostics, AWarningRaisesTheLevelForAMinuteAndStaysInTheValues) {
 TEST(Diagnostics, ANoticeIsListedAndRaisesNothing) {
   const DiagnosticStatus status = statuses(with_event({Time(from_seconds(99)), {}, Reason::levelled, 0.4 * M_PI / 180, 1, {}})).front();
   EXPECT_EQ(+status.level, +DiagnosticStatus::ok);
-  EXPECT_EQ(value_of(status, "notice"), "levelled: 99.000 s, 1 times, the world was turned by 0.40 degrees, so that its z axis is up");
+  EXPECT_EQ(value_of(status, "notice"), "levelled: 99.000 s, 1 times, the world was rotated by 0.40 degrees, so that its z axis is up");
 }
 
 TEST(Diagnostics, AnErrorIsNoMereWarning) {
   const DiagnosticStatus status = statuses(with_event({Time(from_seconds(99)), Sensor::lidar, Reason::map_begun_anew, 0, 1, {}})).front();
   EXPECT_EQ(+status.level, +DiagnosticStatus::error);
-  EXPECT_NE(status.message.find("the map was begun anew"), std::string::npos);
+  EXPECT_NE(status.message.find("the map was restarted"), std::string::npos);
 }
 
 TEST(Diagnostics, NameTheEpoch) {

@@ -68,7 +68,7 @@ struct Library {
   void insert(VoxelKey key, std::uint32_t value) { map.emplace(key, value); }
   std::uint32_t find(VoxelKey key) const {
     const auto it = map.find(key);
-    return it == map.end() ? VoxelIndex::none : it->second;
+    return it == map.end() ? no_index : it->second;
   }
 };
 using Robin = Library<tsl::robin_map<VoxelKey, std::uint32_t, MixedHash>>;

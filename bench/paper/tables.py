@@ -65,7 +65,7 @@ def accuracy(results: dict) -> list[Table]:
     out = [by_modality(f"Table III: ATE RMSE after {name} alignment, mm", results, lambda of, a=align: of[a]["ate_rmse_m"], millimetres,
                        "At the sweeps, as the paper's; of KI at every leg sample. x: diverged.")
            for align, name in (("se3", "SE(3)"), ("yaw", "yaw (position and heading)"))]
-    out.append(by_modality("Table III: RTE over 1 m, % of the way", results, lambda of: of["se3"]["rte_1m_percent"], lambda v: f"{v:.3f}"))
+    out.append(by_modality("Table III: RTE over 1 m, % of the distance", results, lambda of: of["se3"]["rte_1m_percent"], lambda v: f"{v:.3f}"))
     out.append(by_modality("Table IV: end-to-end translation error, mm", results, lambda of: of["se3"]["e2e_m"], millimetres,
                            "No alignment enters: the true and the estimated displacement, each in its first body frame."))
     out.append(by_modality("Table III: end-to-end error along z, mm", results, lambda of: abs(of["se3"]["e2e_z_m"]), millimetres))
@@ -76,8 +76,8 @@ def accuracy(results: dict) -> list[Table]:
             rows.append([name, f"{d['way']:.1f}", f"{d['xy']:.2f}", f"{d['z']:.2f}"])
     if rows:
         rows.append(["mean", "", f"{mean([float(r[2]) for r in rows]):.2f}", f"{mean([float(r[3]) for r in rows]):.2f}"])
-        out.append(Table("Legs and IMU alone from the start (KI): error at the end, % of the way", ["recording", "way, m", "horizontal", "vertical"], rows,
-                         "No scan and no map, ever. Recordings of less than 0.3 m of way are left out."))
+        out.append(Table("Legs and IMU alone from the start (KI): error at the end, % of the distance", ["recording", "distance, m", "horizontal", "vertical"], rows,
+                         "No scan and no map, ever. Recordings of less than 0.3 m of distance are left out."))
     return out
 
 
@@ -120,10 +120,10 @@ def failures(results: dict) -> list[Table]:
 def legs_alone(found: list[dict]) -> list[Table]:
     robots = ("As described: the robot is what its description says. Kept well: its legs, mounts, clocks and soles are a little otherwise "
               "(`kilvo simulate --rough 1`).")
-    both = [drifts([f for f in found if not f["until_lost"]], "Legs and IMU alone (KI) from the start: error at the end, % of the way",
+    both = [drifts([f for f in found if not f["until_lost"]], "Legs and IMU alone (KI) from the start: error at the end, % of the distance",
                    "No scan and no map, ever. " + robots),
-            drifts([f for f in found if f["until_lost"]], "Unrecoverable failure on the same walks: error at the end, % of the way since the LiDAR was lost",
-                   "No camera; the LiDAR is lost for good at the paper's share of the recording. On a way of a metre or less the first millimetres, "
+            drifts([f for f in found if f["until_lost"]], "Unrecoverable failure on the same walks: error at the end, % of the distance since the LiDAR was lost",
+                   "No camera; the LiDAR is lost for good at the paper's share of the recording. On a distance of a metre or less the first millimetres, "
                    "which do not grow with it, are most of the error (Failures).")]
     return [table for table in both if table.rows]
 
@@ -135,7 +135,7 @@ def drifts(found: list[dict], title: str, note: str) -> Table:
         rows += [[f["walk"], str(f["seed"]), LEVELS[level], f"{f['way']:.1f}", f"{f['xy']:.2f}", f"{f['z']:.2f}"] for f in of]
         for word, take in (("mean", mean), ("largest", max)):
             rows.append([word, "", LEVELS[level], "", f"{take([f['xy'] for f in of]):.2f}", f"{take([f['z'] for f in of]):.2f}"])
-    return Table(title, ["walk", "seed", "robot", "way, m", "horizontal", "vertical"], rows, note)
+    return Table(title, ["walk", "seed", "robot", "distance, m", "horizontal", "vertical"], rows, note)
 
 
 def degradation(results: dict) -> list[Table]:
@@ -149,7 +149,7 @@ def degradation(results: dict) -> list[Table]:
 
 
 def measures_of(compared: dict) -> dict:
-    """By column; mm, and % of the way for the drifts."""
+    """By column; mm, and % of the distance for the drifts."""
     out = {}
     for column in COMPARED:
         value = compared.get(column)

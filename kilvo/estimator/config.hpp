@@ -28,11 +28,11 @@ struct InitialConfig {
     return std::tuple{
         Field{"still_time", &InitialConfig::still_time, "s", "how long the robot must stand still to start"},
         Field{"moving_start", &InitialConfig::moving_start, "s",
-              "after so long without standing still it starts moving, with wide uncertainties"},
+              "after so long without standing still it starts while moving, with a large covariance"},
         Field{"still_gyro", &InitialConfig::still_gyro, "rad/s", "standing still: standard deviation of the angular rate below this"},
         Field{"still_accel", &InitialConfig::still_accel, "m/s^2", "standing still: standard deviation of the acceleration below this"},
         Field{"gravity_sigma", &InitialConfig::gravity_sigma, "m/s^2",
-              "how far the accelerometer bias may tilt the first gravity, each way"},
+              "standard deviation of the first gravity along each horizontal axis, from the accelerometer bias"},
         Field{"gyro_bias_sigma", &InitialConfig::gyro_bias_sigma, "rad/s", "uncertainty of the gyro bias measured at rest"},
         Field{"velocity_sigma", &InitialConfig::velocity_sigma, "m/s", "uncertainty of the velocity at rest"}};
   }
@@ -60,9 +60,9 @@ struct EstimatorConfig {
   static constexpr auto fields() {
     return std::tuple{
         Field{"max_wait", &EstimatorConfig::max_wait, "s", "how long, in data time, a measurement waits for others of earlier stamps"},
-        Field{"max_imu_gap", &EstimatorConfig::max_imu_gap, "s", "a longer gap between IMU samples is bridged with wide uncertainties"},
+        Field{"max_imu_gap", &EstimatorConfig::max_imu_gap, "s", "a longer gap between IMU samples is bridged with a large covariance"},
         Field{"wait_for_images", &EstimatorConfig::wait_for_images, "-",
-              "outputs wait for images of earlier stamps; false (the live runner's way): late images are fused when they come"},
+              "outputs wait for images of earlier stamps; false (in the live runner): late images are fused when they come"},
         Field{"smooth_time", &EstimatorConfig::smooth_time, "s",
               "the smooth odometry takes about two thirds of a correction in over this time"},
         Field{"gravity_align", &EstimatorConfig::gravity_align, "-", "z of the world is up; false: the world is the first IMU frame"},

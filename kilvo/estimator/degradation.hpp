@@ -1,4 +1,4 @@
-// How much a sweep or an image has to say: one number each, and whether that is too little. What judges a sensor is added here.
+// Indicators of how much information a sweep or an image has: one number each, and whether it is too small.
 #pragma once
 
 #include <span>

@@ -31,8 +31,8 @@ class LivePropagator;
 
 class Estimator {
  public:
-  /// `used`: which sensors will be pushed, by Sensor; others are ignored and counted. Throws std::invalid_argument when a setting makes
-  /// no sense (its name is in the text).
+  /// `used`: which sensors will be pushed, by Sensor; others are ignored and counted. Throws std::invalid_argument when a setting is
+  /// invalid (its name is in the text).
   Estimator(const Robot& robot, const EstimatorConfig& config, std::array<bool, sensor_count> used);
   Estimator(Estimator&&) noexcept;
   Estimator& operator=(Estimator&&) noexcept;

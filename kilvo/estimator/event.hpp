@@ -17,9 +17,9 @@ struct Event {
   Time t{};
   std::optional<Sensor> sensor;  // none: of the estimate as a whole
   Reason reason = Reason::start;
-  double value = 0;         // SI units; what it is, the text of the reason says
+  double value = 0;         // SI units; described by the text of the reason
   std::uint64_t count = 1;  // how often it has become true until now; of messages, how many
-  std::string detail;       // what a number does not say
+  std::string detail;       // details beside the value
 
   bool operator==(const Event&) const = default;
 };

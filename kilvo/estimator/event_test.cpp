@@ -22,7 +22,7 @@ TEST(Reasons, HaveNamesOfTheirOwnThatFitACsvFile) {
 
 TEST(Events, SayTheSensorTheValueAndTheCount) {
   EXPECT_EQ(text_of(Event{at(1), Sensor::lidar, Reason::clock_offset, -0.0123, 1, "lidar.time_offset to -0.0123"}),
-            "lidar: its clock is -12.3 ms behind the IMU's (negative: ahead), and is corrected from when that was seen: set "
+            "lidar: its clock is -12.3 ms behind the IMU's (negative: ahead), and is corrected from now on: set "
             "lidar.time_offset to -0.0123");
   EXPECT_EQ(text_of(Event{at(1), Sensor::camera, Reason::agrees_with_nothing, 0, 25, {}}),
             "camera: 25 messages could not be used: agrees with nothing");

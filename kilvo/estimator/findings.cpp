@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kilvo/estimator/initialise.hpp"
+#include "kilvo/filter/stationarity.hpp"
 #include "kilvo/math/decimals.hpp"
 #include "kilvo/sensors/robot.hpp"
 
@@ -12,13 +13,14 @@ namespace {
 
 // The streams are looked at so often, and over so long what was used of them.
 constexpr Duration streams_period = std::chrono::seconds(1), use_period = std::chrono::seconds(10);
-// Fewer messages than these say nothing of a sensor.
+// With fewer messages a sensor is not judged.
 constexpr std::uint64_t few = 20;
-// What differs from the biases at the start by more than this is no bias: of a sensor that drifts, and of none at all, m/s^2, rad/s.
-constexpr double strange_accel = 0.3, impossible_accel = 0.8, strange_gyro = 0.03;
-// Three times the speed at which no leg of this length can walk (Froude number 1): nobody runs faster either.
+// What differs from the biases at the start by more than this is no bias: of a sensor that drifts, and of none at all, m/s^2. Of the
+// gyroscope they are largest_resting_rate and largest_gyro_bias.
+constexpr double strange_accel = 0.3, impossible_accel = 0.8;
+// Three times the speed at which no leg of this length can walk (Froude number 1): no robot runs faster either.
 constexpr double fastest = 3.0;
-// So many times within use_period nothing stood still under the robot, and the velocity was given up.
+// So many times within use_period no foot was at rest, and the velocity was reset.
 constexpr std::uint64_t most_lost_stances = 3;
 
 // What every start has, and what the user asked for.
@@ -122,7 +124,7 @@ void Findings::report_streams(const Situation& now) {
 void Findings::report_use(const Use& before, const Situation& now) {
   const std::uint64_t legs = statistics_.sensors[index_of(Sensor::legs)].used;
   const std::uint64_t unsupported = statistics_.unsupported - before.unsupported;
-  // Even who runs has a foot on the ground for more than half of the time.
+  // Even a running robot has a foot on the ground for more than half of the time.
   if (unsupported > few && 2 * unsupported > legs - before.used[index_of(Sensor::legs)]) {
     const double share = static_cast<double>(statistics_.unsupported) / static_cast<double>(legs);
     events_.state({now.t, Sensor::legs, Reason::feet_not_still, share, 1, {}});
@@ -141,7 +143,7 @@ void Findings::report_use(const Use& before, const Situation& now) {
   const std::uint64_t refused = drops_[lidar][nowhere] - before.dropped[lidar][nowhere];
   if (!statistics_.diverged && refused > few && refused > statistics_.sensors[lidar].used - before.used[lidar]) {
     contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar, now), static_cast<double>(refused),
-               "most sweeps did not fit the map where they should have been", now);
+               "most sweeps did not fit the map at the predicted pose", now);
   }
   if (events_.all() != statistics_.events) statistics_.events = events_.all();
 }
@@ -157,7 +159,7 @@ void Findings::report_new_map(const Situation& now) {
   ++statistics_.maps_begun_anew;
   report(now, Sensor::lidar, Reason::map_begun_anew);
   contradict(Reason::diverged, Sensor::lidar, witness_against(Sensor::lidar, now), 2,
-             "for 2 s no sweep fitted the map where it should have been", now);
+             "for 2 s no sweep fitted the map at the predicted pose", now);
 }
 
 Sensor Findings::witness_against(Sensor s, const Situation& now) {
@@ -177,7 +179,7 @@ void Findings::judge_stances(const Situation& now) {
   lost_stances_before_ = statistics_.lost_stances;
   if (lost >= most_lost_stances && !statistics_.diverged)
     contradict(Reason::diverged, Sensor::legs, has_lidar(now.modality) ? Sensor::lidar : Sensor::imu, static_cast<double>(lost),
-               "for seconds no foot seemed to stand still, and the velocity was given up " + std::to_string(lost) + " times in 10 s", now);
+               "for seconds no foot was at rest, and the velocity was reset " + std::to_string(lost) + " times in 10 s", now);
 }
 
 void Findings::judge_speed(const Situation& now) {
@@ -185,7 +187,7 @@ void Findings::judge_speed(const Situation& now) {
   const double sigma = std::sqrt(std::max(0.0, now.estimate.P.diagonal().segment<3>(at::v).maxCoeff()));
   if (speed < limit || sigma > 0.3 * speed || statistics_.diverged) return;
   contradict(Reason::diverged, Sensor::imu, has_lidar(now.modality) ? Sensor::lidar : Sensor::legs, speed,
-             "together they say a speed of " + decimals(speed, 1) + " m/s", now);
+             "together they give a speed of " + decimals(speed, 1) + " m/s", now);
 }
 
 void Findings::judge_biases(const Situation& now) {
@@ -194,19 +196,19 @@ void Findings::judge_biases(const Situation& now) {
   const Biases present = {now.estimate.x.ba, now.estimate.x.bg};
   if (!first_biases_) first_biases_ = present;
   // Those of a start on the move are a guess: they may be anything until they are known.
-  if (!known_biases_ && 5 * accel_sigma < strange_accel && 5 * gyro_sigma < strange_gyro) known_biases_ = present;
+  if (!known_biases_ && 5 * accel_sigma < strange_accel && 5 * gyro_sigma < largest_resting_rate) known_biases_ = present;
   if (!known_biases_) return;
   // Aliased noise walks a bias: it may have gone as far as it is uncertain.
   const auto beyond = [&](const Biases& before, double accel, double gyro) {
     return (present.accel - before.accel).norm() > accel + 3 * accel_sigma || (present.gyro - before.gyro).norm() > gyro + 3 * gyro_sigma;
   };
   const bool impossible = beyond(*first_biases_, impossible_accel, largest_gyro_bias);
-  if (impossible ? statistics_.diverged : strange_biases_ || !beyond(*known_biases_, strange_accel, strange_gyro)) return;
+  if (impossible ? statistics_.diverged : strange_biases_ || !beyond(*known_biases_, strange_accel, largest_resting_rate)) return;
   strange_biases_ = true;
   const Biases& before = impossible ? *first_biases_ : *known_biases_;
   const double accel = (present.accel - before.accel).norm();
   const std::string why = "the biases that would reconcile them have changed by " + decimals(accel, 2) + " m/s^2 and " +
-                          decimals((present.gyro - before.gyro).norm(), 3) + " rad/s: is the mount right?";
+                          decimals((present.gyro - before.gyro).norm(), 3) + " rad/s: check the mount";
   contradict(impossible ? Reason::diverged : Reason::inconsistent, Sensor::imu, has_lidar(now.modality) ? Sensor::lidar : Sensor::legs,
              accel, why, now);
 }

@@ -17,7 +17,7 @@ namespace kilvo {
 
 class Findings {
  public:
-  /// What the estimator knows when something is judged.
+  /// The estimator's data when a finding is judged.
   struct Situation {
     Time t;                    // of the estimate; before there is one, of the IMU
     const Estimate& estimate;  // anything before there is one
@@ -43,9 +43,9 @@ class Findings {
   void report_clock_offset(const Situation& now, Sensor s, double total, double configured);
   /// The camera seems to be turned by `turned` rad about the axes of the IMU.
   void report_turned_camera(const Situation& now, const Eigen::Vector3d& turned);
-  /// Sweeps had fitted nowhere for so long that the map was begun anew.
+  /// No sweep had fitted for so long that the map was restarted.
   void report_new_map(const Situation& now);
-  /// `a` and `b` cannot both be right.
+  /// `a` and `b` contradict each other.
   void contradict(Reason reason, Sensor a, Sensor b, double value, const std::string& why, const Situation& now);
   /// Which other sensor carried the estimate until now.
   static Sensor witness_against(Sensor s, const Situation& now);

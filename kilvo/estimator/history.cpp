@@ -10,7 +10,7 @@ namespace {
 
 // Undistortion never looks farther back than this.
 constexpr Duration trajectory_length = std::chrono::milliseconds(500);
-// What is thrown away took no less time than this, s.
+// A discarded interval is at least this long, s.
 constexpr double least_gap = 0.02;
 
 // What the IMU gets wrong in the second half of a sweep also moved the points taken then: the share of the process noise until the end
@@ -105,7 +105,7 @@ void History::inflate_velocity(double sigma) {
 }
 
 double History::roll_back() {
-  // Where the robot went since, nobody knows: about as far as it was going.
+  // The motion since is unknown: the robot is assumed to have kept its velocity.
   const Time t = std::max(now_.t, good_.t);
   const double lost = to_seconds(t - good_.t);
   const double thrown = now_.x.v.allFinite() ? std::min(absurd_speed, (now_.x.v - good_.x.v).norm()) : absurd_speed;

@@ -30,12 +30,12 @@ class History {
   /// The poses of the last half second.
   const Trajectory& trajectory() const { return trajectory_; }
 
-  /// The estimate of a time not before the base. What was passed on the way is in the trajectory.
+  /// The estimate of a time not before the base. The poses up to then are in the trajectory.
   Estimate at(Time t) { return record_from(base_, t); }
   /// For a sweep around `middle` until `end`: a history that does not trust the accelerometer since the base; or, if the sweep is `off` by
   /// so much (m), one whose base has a less certain velocity. None when it is too long ago, or too much. now() and closed() stay.
   std::optional<History> doubted(Time middle, Time end, std::optional<double> off) const;
-  /// The estimate at `until` if it was `e` before. The poses on the way are in the trajectory.
+  /// The estimate at `until` if it was `e` before. The poses in between are in the trajectory.
   Estimate record_from(const Estimate& e, Time until);
   /// Poses of the trajectory at `t` and at the base; the same twice when `t` is not before the base, none when it is too long before.
   struct Motion {
@@ -53,7 +53,7 @@ class History {
 
   /// Carries now() on to `t`, of a leg sample, with the newest IMU sample held.
   void predict_to(Time t) { replay_.predict_to(now_, t, nullptr); }
-  /// Carries now() on to `t`, with the leg updates on the way.
+  /// Carries now() on to `t`, with the leg updates until then.
   void advance_to(Time t) { replay_.advance(now_, t, record()); }
   /// A leg update of now()'s time. Returns which feet were used and not refused.
   std::array<bool, 2> take(const LegStep& step) { return replay_.take(now_, step); }
@@ -75,12 +75,12 @@ class History {
   /// A sweep until `end` took `prior` to `posterior`, of its middle: see Replay::correlate_with_sweep and,
   /// where nothing else has moved the velocity (`alone`), learn_aliased_share.
   void correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior, bool alone);
-  /// The velocity is less certain than the covariance says, by this standard deviation, m/s.
+  /// Adds the square of this standard deviation to the velocity's variance, m/s.
   void inflate_velocity(double sigma);
 
   /// The estimate of the newest IMU sample is one to go back to.
   void remember_good() { good_ = closed_; }
-  /// now() made no sense: back to the last good estimate, carried on with what a robot may have done since. Returns how long ago it was, s.
+  /// now() was not plausible: back to the last good estimate, with its covariance inflated over the time since. Returns that time, s.
   double roll_back();
 
   /// For the live propagator: becomes what is needed to go on from the newest IMU sample of `other`. A fork has no base and no trajectory:
@@ -97,7 +97,7 @@ class History {
 
   Replay replay_;
   Estimate base_, closed_, now_;
-  Estimate good_;  // the last closed_ that made sense
+  Estimate good_;  // the last plausible closed_
   Trajectory trajectory_;
   double closing_us_ = 0;
   bool begun_ = false, is_fork_ = false;

@@ -15,7 +15,8 @@ constexpr double usual_range = 16 * standard_gravity;
 ImuWatch::ImuWatch(const ImuMount& mount, const InitialConfig& config)
     : absurd_accel_(1.8 * std::max(mount.accel_range, usual_range)),
       clipping_(mount.gyro_range, mount.accel_range),
-      stationarity_(config.still_gyro, config.still_accel, unusual_deviation) {}
+      velocity_sigma_(config.velocity_sigma),
+      stationarity_(config.still_gyro, config.still_accel) {}
 
 std::optional<Reason> ImuWatch::prepare(ImuSample& s) {
   s.accel *= accel_scale_;
@@ -27,10 +28,10 @@ std::optional<Reason> ImuWatch::prepare(ImuSample& s) {
 
 std::optional<Estimate> ImuWatch::zero_velocity_update(const Estimate& e, const ImuSample& s, const UpdateConfig& config) {
   constexpr Duration period = std::chrono::milliseconds(100);
-  constexpr double velocity_sigma = 0.01, accel_sigma = 0.2;  // m/s, m/s^2
+  constexpr double accel_sigma = 0.2;  // m/s^2
   if (!stationarity_.stands() || (last_update_ && s.t - *last_update_ < period)) return std::nullopt;
   last_update_ = s.t;
-  const auto at_rest = [&s](const State& x, const Covariance&) {
+  const auto at_rest = [&](const State& x, const Covariance&) {
     const Eigen::Vector3d down_I = x.R.inverse() * x.g;
     Rows<6> rows;
     rows.r.resize(6);
@@ -41,7 +42,7 @@ std::optional<Estimate> ImuWatch::zero_velocity_update(const Estimate& e, const 
     rows.H.block<3, 3>(3, at::ba).setIdentity();
     rows.H.block<3, 3>(3, at::g) = -x.R.matrix().transpose();
     rows.R.setZero(6, 6);
-    rows.R.diagonal().head<3>().array() = velocity_sigma * velocity_sigma;
+    rows.R.diagonal().head<3>().array() = velocity_sigma_ * velocity_sigma_;
     rows.R.diagonal().tail<3>().array() = accel_sigma * accel_sigma;
     return rows;
   };

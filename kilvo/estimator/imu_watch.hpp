@@ -16,7 +16,7 @@ class ImuWatch {
  public:
   ImuWatch(const ImuMount& mount, const InitialConfig& config);
 
-  /// Accelerations are `scale` times what the samples say, in m/s^2.
+  /// Accelerations are `scale` times the samples' values, in m/s^2.
   void set_scale(double scale) { accel_scale_ = scale; }
 
   /// Converts a sample to m/s^2 and marks what is clipped. Returns why it must not be used.
@@ -35,6 +35,7 @@ class ImuWatch {
  private:
   double accel_scale_ = 1, absurd_accel_;  // -, m/s^2
   ClippingDetector clipping_;
+  double velocity_sigma_;  // at rest, m/s
   StationarityDetector stationarity_;
   std::optional<Time> last_update_;  // by standing still
 };

@@ -26,7 +26,7 @@ Statistics3 statistics_of(const std::deque<ImuSample>& window, Member member) {
 // The resting norm is near 1: the unit is g. Rescaling to the exact norm would hide the bias, so only the unit is changed.
 double unit_of(double resting_norm) { return std::abs(resting_norm - 1.0) < 0.1 ? standard_gravity : 1.0; }
 
-// How far the velocity leaves its mean's line, m/s: who comes to a stand within the window is slow to show in a deviation.
+// How far the velocity leaves its mean's line, m/s: a robot that stops within the window changes the standard deviation little.
 double largest_change_of_velocity(const std::deque<ImuSample>& window, const Eigen::Vector3d& mean_accel) {
   Eigen::Vector3d v = Eigen::Vector3d::Zero();
   double largest = 0;
@@ -127,7 +127,7 @@ Start Initialiser::start(bool still) const {
   e.x.g = -standard_gravity * up_W;
 
   // The world is fixed by the first pose. Gravity carries the tilt: two directions, and at rest the accelerometer bias turns with it.
-  constexpr double moving_tilt = 0.4;  // m/s^2: who sets off changes his velocity by this much a second
+  constexpr double moving_tilt = 0.4;  // m/s^2: the change of velocity of a robot that starts to walk
   const double tilt = still ? config_.gravity_sigma : moving_tilt;
   const Eigen::Matrix3d horizontal = Eigen::Matrix3d::Identity() - up_W * up_W.transpose();
   const Eigen::Matrix3d gravity = tilt * tilt * horizontal;

@@ -56,7 +56,7 @@ bool LivePropagator::push(const Feet& feet) {
   if (feet.t < history_.now().t) return false;
   status_.use(Sensor::legs, feet.t);
   history_.predict_to(feet.t);
-  // Without the map: it is the estimator's, and grows. What the ground tells is told by the next fork.
+  // Without the map, which only the estimator has. The next fork carries the measurement of the ground.
   const auto [step, contact_us] =
       legs_.measure(feet, history_.now(), history_.replay().imu_at(feet.t), nullptr, StanceTracker::Ground::learn);
   legs_.judge(step, history_.take(step));

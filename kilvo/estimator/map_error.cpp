@@ -13,7 +13,7 @@ namespace {
 // A new epoch begins when a variance has changed by this factor, so their number grows with the logarithm of the uncertainty.
 constexpr double change = 1.25;
 constexpr std::size_t max_epochs = 65536;
-// What surfaces that are not quite where the map has them do to the length of a way that only images measure.
+// Relative error of a distance that only images measure, from errors of the map's surfaces.
 constexpr double scale_error = 1e-3;
 
 // A root of a covariance that may be singular.

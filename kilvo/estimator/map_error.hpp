@@ -28,13 +28,13 @@ class MapError {
   /// `systematic`: LidarModel::systematic(). Planes of no epoch (of a map that was given) are where they should be.
   void registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic, const PoseCovariance& weak);
 
-  /// The map begins anew at a pose that is wrong by so much more: nothing ties it to the one before.
+  /// The map restarts at a pose that is wrong by so much more: nothing ties it to the one before.
   void lost(const SE3& T_WI, const PoseCovariance& more);
 
   /// P + D as a twist at the world's origin.
   PoseCovariance total(const SE3& T_WI, const PoseCovariance& P) const;
 
-  /// Along `weak`, which no sweep knows, D becomes what the views are wrong by, and what the way from there adds.
+  /// Along `weak`, which no sweep measures, D becomes the error of the views plus that of the distance from them.
   void seen(const SE3& T_WI, std::span<const EarlierView> views, const PoseCovariance& weak);
 
  private:

@@ -12,7 +12,7 @@ struct ModalityRow {
   Modality modality;
   const char* name;  // as written in files
   bool legs, lidar, camera;
-  /// The height of the feet over the map's ground is a measurement. Beside a LiDAR it tells nothing new.
+  /// The height of the feet over the map's ground is a measurement. With a LiDAR it adds no information.
   bool ground_is_measured;
 };
 

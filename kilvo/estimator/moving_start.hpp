@@ -22,10 +22,10 @@ class MovingStart {
   /// The parts of the next sweep correct the history, which has come to the sweep's end then. True when any of them was registered.
   /// `drops`: counts the points that are not used.
   bool add(const LidarScan& scan, History& history, PointDrops& drops);
-  /// Something else tells the velocity from now on: what sweeps have told is not kept.
+  /// Another sensor measures the velocity from now on: the result of the sweeps is not kept.
   void give_up(History& history, Time now);
-  /// The velocity is known, or has not been found for long: gravity and biases are the guesses of the start again, of which parts of sweeps
-  /// say too little.
+  /// The velocity is known, or has not been found for long: gravity and biases are the guesses of the start again, since parts of sweeps
+  /// measure them too little.
   bool is_over() const { return is_over_; }
   /// What the covariance of a pose there lacks: it is relative to where the parts' map began, or the robot when it was over.
   PoseCovariance error_at(const SE3& T_WI) const { return map_.error_at(T_WI); }

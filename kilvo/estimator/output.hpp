@@ -30,7 +30,7 @@ struct StageTimes {
 
 struct Output {
   Time t{};
-  std::uint32_t epoch = 0;  // grows when the time went back and everything began anew: another world, another time
+  std::uint32_t epoch = 0;  // grows when the time went back and everything restarted: another world, another time
   State x;
   std::optional<SO3> R_LW;                          // the turn that has levelled the world (Levelling::apply); none: as it began
   std::optional<Eigen::Vector3d> vertical_W;        // settled by the legs (LevelGround): what the world is to be levelled by
@@ -62,16 +62,16 @@ struct SensorCount {
 struct Statistics {
   std::array<SensorCount, sensor_count> sensors;   // by Sensor
   PointDrops points;                               // LiDAR points not used, by cause
-  std::uint64_t lost_stances = 0;                  // on the legs alone no foot was found for so long that the velocity was given up
+  std::uint64_t lost_stances = 0;                  // on legs and IMU alone no stance foot was found for so long that the velocity was reset
   std::uint64_t unsupported = 0;                   // leg samples in which no foot stood, or stood still enough to be used
-  std::uint64_t rollbacks = 0;                     // a non-finite state was thrown away
+  std::uint64_t rollbacks = 0;                     // a non-finite state was discarded
   std::array<StreamHealth, sensor_count> health;   // by Sensor
   std::uint64_t imu_outages = 0;                   // the IMU was silent for so long that the pose was unknown
   std::array<double, sensor_count> clock_shift{};  // by Sensor: s, found to be missing from the stamps, and added since
   std::uint64_t clock_steps = 0;                   // the IMU's time stepped for good
   std::uint64_t searches = 0, found = 0;           // sweeps whose pose was searched for, and found
   std::uint64_t maps_begun_anew = 0;               // because sweeps had fitted nowhere for long
-  std::uint32_t epochs = 1;                        // times that everything began anew, and one
+  std::uint32_t epochs = 1;                        // times that everything restarted, and one
   bool diverged = false;
   std::vector<Event> events;  // one for each sensor and reason, as it was last
 };

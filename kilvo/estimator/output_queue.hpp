@@ -18,7 +18,7 @@ class OutputQueue {
   bool empty() const { return sweeps_.empty() && images_.empty(); }
   bool has_sweep() const { return !sweeps_.empty(); }
 
-  /// Appends the output of `t`, with the oldest results that wait; none when one of this time has gone out, which has said it all.
+  /// Appends the output of `t`, with the oldest results that wait; none when one of this time has been emitted.
   Output* next(Time t, std::vector<Output>& out);
   std::optional<Time> last() const { return last_; }
 

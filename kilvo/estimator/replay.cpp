@@ -29,8 +29,8 @@ void Replay::inflate_for_missed(ImuInterval& interval, double gap) const {
 // Beyond the end of its range an IMU may have seen anything of the same size. And no body turns or is pushed so much within one sample, or
 // so far from what is usual: samples are wrong, or little is known of between.
 void Replay::inflate_for_faults(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const {
-  constexpr double missing_gyro = 3, missing_accel = 20, largest_turn = 3, largest_push = 100;  // rad/s, m/s^2
-  if (a.gyro_clipped || b.gyro_clipped) interval.more_gyro = missing_gyro * missing_gyro * correlation;
+  constexpr double largest_turn = 3, missing_accel = 20, largest_push = 100;  // rad/s, m/s^2
+  if (a.gyro_clipped || b.gyro_clipped) interval.more_gyro = largest_turn * largest_turn * correlation;
   if (a.accel_clipped || b.accel_clipped) interval.more_accel = missing_accel * missing_accel * correlation;
   const double turned = (b.gyro - a.gyro).norm(), pushed = std::max((b.accel - a.accel).norm(), (b.accel - usual_.accel_mean).norm());
   if (turned <= largest_turn && pushed <= largest_push) return;
@@ -47,7 +47,7 @@ bool Replay::is_blind(Time begin, Time end) const {
   return false;
 }
 
-// The closed interval [begin, end] between two samples; when nobody saw the motion in between, with noise that says so.
+// The closed interval [begin, end] between two samples; with more noise when the motion in between was not measured.
 ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const {
   ImuInterval interval = ImuInterval::between(a, b, begin, end);
   const double gap = to_seconds(b.t - a.t);
@@ -64,7 +64,7 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   interval.more_accel = gap > blind_gap ? 0 : accel2 * gap;  // more is added after the prediction (inflate_covariance_over_gap)
   constexpr double told_by_its_ends = 0.25;                  // s
   if (gap > told_by_its_ends) {
-    // The two samples say nothing of the time between.
+    // The two samples do not determine the motion between them.
     interval.more_gyro = 0;
     interval.gyro_begin = interval.gyro_end = x.bg;
     interval.accel_begin = interval.accel_end = x.ba - x.R.inverse() * x.g;
@@ -120,7 +120,7 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   if (e.t >= until) return;
   ImuSample held = imu_.back();
   held.t = until;
-  // Within a period it is held; a copy of itself is no sample that says the same twice.
+  // Within a period it is held; a held sample is not a second measurement.
   const bool is_gap = to_seconds(until - imu_.back().t) > longest_gap();
   step(is_gap ? interval_between(imu_.back(), held, e.t, until, e.x) : ImuInterval::hold(held, e.t, until));
 }

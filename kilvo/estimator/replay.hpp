@@ -1,5 +1,5 @@
-// What IMU and legs said since a time, and how an estimate of that time is brought to a later one: the same road whether it is taken once
-// or again after a sweep has corrected its beginning.
+// The IMU samples and leg updates since a time, and the propagation of an estimate of that time to a later one: the same code for the first
+// propagation and for the re-propagation after a sweep has corrected the earlier estimate.
 #pragma once
 
 #include <optional>
@@ -29,10 +29,10 @@ class Replay {
   /// The noise of the settings, with that of the gyroscope as large as gaps, clipping and jumps within [begin, end] make it.
   ProcessNoise noise_within(Time begin, Time end) const;
 
-  /// What the gyroscope said, rad/s; none within a gap.
+  /// The angular rate as measured, rad/s; none within a gap.
   std::optional<Eigen::Vector3d> gyro_at(Time t) const;
 
-  /// What the IMU said at `t`: between two samples, or the last one held.
+  /// The IMU's measurement at `t`: interpolated between two samples, or the last one held.
   ImuSample imu_at(Time t) const;
 
   /// Density of the accelerometer's noise as it is taken, m/s^2/sqrt(Hz): that of the settings, or more when the samples show it.
@@ -43,7 +43,7 @@ class Replay {
   /// The stamp of the newest IMU sample that is not after t; before all times when there is none.
   Time newest_imu_by(Time t) const;
 
-  /// Predicts e to `until`, applying the leg steps after e.t on the way. Between IMU samples with both of them, after the newest one with
+  /// Predicts e to `until`, applying the leg updates after e.t. Between IMU samples with both of them, after the newest one with
   /// that held. Every state goes into `record`, if there is one.
   void advance(Estimate& e, Time until, Trajectory* record) const;
 
@@ -53,27 +53,27 @@ class Replay {
   /// Adds a leg step and applies it to e, which must be of its time. Returns which feet of it were used and not refused.
   std::array<bool, 2> take(Estimate& e, const LegStep& step);
 
-  /// Brings `closed`, of the time of an IMU sample, to that of a later one: as advance() does, at a third of the cost when `live` went that
-  /// way with the first sample held and took the steps. The mean goes it again with both samples and the gains of then; the covariance,
-  /// which they hardly change, is that of `live`.
+  /// Brings `closed`, of the time of an IMU sample, to that of a later one: as advance() does, at a third of the cost when `live` was
+  /// propagated with the first sample held and has the leg updates. The mean is propagated again with both samples and the stored gains;
+  /// the covariance, which they barely change, is that of `live`.
   void close(Estimate& closed, const Estimate& live, Time until, Trajectory* record);
 
-  /// A sweep until `end` has been used with points that the IMU's motion took to its middle: what they told of the pose holds these shares
-  /// of what the IMU will get wrong in rotation and in position until then.
+  /// A sweep until `end` has been used with points that the IMU's motion took to its middle: their information about the pose contains
+  /// these shares of the IMU's error in rotation and in position until then.
   void correlate_with_sweep(Time end, double rotation, double position) { sweep_noise_ = {end, rotation, position}; }
 
   /// A sweep changed the velocity by so much, squared, per variance of what it was to change it by.
   void learn_aliased_share(double normalised);
 
-  /// The robot stood still until `end`, if it did, and the first biases are the means of what the IMU said until then.
+  /// The robot stood still until `end`, if it did, and the first biases are the means of the IMU's samples until then.
   void began_at_rest(std::optional<Time> end) { rest_until_ = end; }
 
-  /// `e` came from the oldest estimate that will be replayed by advance(): a way to a later time may begin there instead.
+  /// `e` came from the oldest estimate that will be replayed by advance(): a propagation to a later time may start there instead.
   void remember(const Estimate& e);
   /// The last estimate remembered that is not later than `t`, else `oldest`.
   const Estimate& nearest(Time t, const Estimate& oldest) const;
 
-  /// What the accelerometer reported after the time of `base` is not believed: as if nothing had pushed the robot, nor was known to.
+  /// The accelerometer's samples after the time of `base` are not used: replaced by gravity, and marked as clipped.
   void doubt_acceleration(const Estimate& base);
 
   /// The oldest estimate that will be replayed has changed.

@@ -1,4 +1,4 @@
-// What the IMU's samples of the last seconds say of its noise.
+// The IMU's noise, estimated from the samples of the last seconds.
 #include <algorithm>
 #include <cmath>
 
@@ -40,7 +40,7 @@ void Replay::note_usual(const ImuSample& s) {
 
 double Replay::longest_gap() const { return std::max(config_.max_imu_gap, periods_of_a_gap * usual_.period); }
 
-// What varies faster than the rate of the IMU is folded into it. As far as it is more than the settings say, a share of it stays in the
+// Motion faster than half of the IMU's rate is aliased. Where the noise exceeds the settings, a share of the excess stays in the
 // integral, and where it is more than half a second of samples shows by chance, a part of that each second in a bias: samples that are in
 // step with the robot's steps add up.
 ProcessNoise Replay::noise_now() const {

@@ -1,4 +1,4 @@
-// Scans cut anew so that each ends at an image, as the paper has it (Section IV-D): the way to compare with. Ours takes both as they are.
+// Scans cut anew so that each ends at an image, as in the paper (Section IV-D), for comparison. Ours uses both as they are.
 #pragma once
 
 #include <vector>

@@ -62,7 +62,7 @@ bool SensorStatus::may_legs_return(Time t, bool is_calm, bool is_velocity_known,
   if (has_legs() || !track(Sensor::legs).was_used) return true;
   const bool has_waited_long = has_waited(Sensor::legs, t);
   if (health.is_frozen(Sensor::legs)) return false;
-  // Sweeps, if there are any, tell the velocity soon.
+  // Sweeps, if there are any, measure the velocity soon.
   const auto heard = health.heard(Sensor::lidar);
   const bool sweeps = heard && !is_silence(t - *heard, rate_of(Sensor::lidar));
   const bool ready = (is_calm || settles_nothing_) && (is_velocity_known || !sweeps);

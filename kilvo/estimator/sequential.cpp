@@ -107,7 +107,7 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
   const auto motion = history_.motion_since(image.t);
   if (!motion) return refuse(Reason::before_state);
   if (history_.replay().is_blind(image.t, image.t)) return refuse(Reason::no_imu);
-  // Vision lives by the surfaces of the LiDAR: without it, nobody can tell what hides what, and images can only drift.
+  // Vision needs the surfaces of the LiDAR: without it occlusions are unknown, and images can only drift.
   const double rate = input_.robot().lidar.rate;
   if (is_silence(image.t - frames_.last_middle().value_or(Time{}) - from_seconds(0.5 / rate), rate)) return refuse(Reason::no_lidar);
   if (lidar_.is_rejoining()) return refuse(Reason::before_rejoined);

@@ -55,7 +55,7 @@ bool WorldMap::refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time en
 
 void WorldMap::begin_anew(const Estimate& e) {
   surfaces_ = VoxelMap(config_);
-  // Nothing told how far away the robot is.
+  // The robot may be anywhere within these.
   constexpr double moved = 5.0, climbed = 1.0, turned = 0.5;  // m, m, rad
   PoseCovariance unknown = PoseCovariance::Zero();
   const Eigen::Vector3d up_I = e.x.R.matrix().transpose() * -e.x.g.normalized();

@@ -28,7 +28,7 @@ class WorldMap {
   /// `history` and `prior` become what they are without. `alone`: see LidarPipeline::Context. `drops`: counts the points that are not used.
   Registration register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool alone, History& history, Estimate& prior,
                               PointDrops& drops) const;
-  /// A sweep fitted nowhere. True when that has lasted: the robot is taken to be outside of the map, and it begins anew around `prior`,
+  /// A sweep fitted nowhere. True when that has lasted: the robot is taken to be outside of the map, and it restarts around `prior`,
   /// unless it was given.
   bool refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time end);
 
@@ -41,7 +41,7 @@ class WorldMap {
   }
   /// The first sweep: the pose there is wrong by so much more than the filter knows.
   void begin_at(const SE3& T_WI, const PoseCovariance& more) { error_.lost(T_WI, more); }
-  /// The robot is outside of the map, farther away than a search would have looked: the map begins anew around `e`.
+  /// The robot is outside of the map, farther away than a search would have looked: the map restarts around `e`.
   void begin_anew(const Estimate& e);
 
  private:

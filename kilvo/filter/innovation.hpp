@@ -1,4 +1,4 @@
-// Whether a measurement and what was known before it disagree by what both say they are wrong by. Their squared distance per degree of
+// Whether a measurement and the prior disagree by more than their covariances. Their squared distance per degree of
 // freedom is 1 on average if both are right, whatever the robot, the sensor and the place: what exceeds that is an error that the
 // measurement does not know of (a calibration, a model).
 #pragma once
@@ -20,7 +20,7 @@ inline constexpr double usual_loss = 1.5;
 /// `P`. None when it does not hold all of the pose. The columns of `info` begin with those of the pose.
 std::optional<double> normalised_innovation(const Information<7>& info, const Covariance& P);
 
-/// By how much the variance of a sensor's measurements exceeds what they say, learnt from their innovations.
+/// By how much the variance of a sensor's measurements exceeds their covariance, learnt from their innovations.
 class InnovationScale {
  public:
   /// Of one measurement, if it has one.

@@ -1,5 +1,5 @@
 // What a sensor module hands the filter about one iterate: either sums over many rows (Information) or the few rows themselves (Rows).
-// Both speak of the same cost, 1/2 sum |r + H d|^2 weighted by R^-1, for a step d of the error state at the iterate.
+// Both define the same cost, 1/2 sum |r + H d|^2 weighted by R^-1, for a step d of the error state at the iterate.
 #pragma once
 
 #include <Eigen/Core>

@@ -11,7 +11,7 @@
 
 namespace kilvo {
 
-/// What the IMU said from `begin` to `end`: rate and specific force at both ends (equal when only the latest sample is known).
+/// The IMU's measurement from `begin` to `end`: rate and specific force at both ends (equal when only the latest sample is known).
 struct ImuInterval {
   Time begin{}, end{};
   Eigen::Vector3d gyro_begin, gyro_end;    // rad/s
@@ -34,9 +34,9 @@ struct ProcessNoise {
   double velocity = 8e-4;        // m/s/sqrt(Hz)
   double gyro_bias = 2e-5;       // rad/s/sqrt(s)
   double accel_bias = 3e-4;      // m/s^2/sqrt(s)
-  double foot = 0.005;           // m/sqrt(s), of a standing foot, each axis of the foot frame
+  double foot = 0.005;           // m/sqrt(s), of a stance foot, each axis of the foot frame
   double exposure = 0.05;        // 1/sqrt(s)
-  double foot_vertical = 0.025;  // m/sqrt(s), of a standing foot against gravity
+  double foot_vertical = 0.025;  // m/sqrt(s), of a stance foot against gravity
   bool foot_turns = false;       // foot_vertical is along the foot's own vertical
 
   static constexpr auto fields() {
@@ -47,14 +47,14 @@ struct ProcessNoise {
               "noise density of the integrated acceleration that does not accumulate: aliased impacts that the next samples take back"},
         Field{"gyro_bias_walk", &ProcessNoise::gyro_bias, "rad/s/sqrt(s)", "random walk of the gyro bias"},
         Field{"accel_bias_walk", &ProcessNoise::accel_bias, "m/s^2/sqrt(s)", "random walk of the accelerometer bias"},
-        Field{"foot_noise", &ProcessNoise::foot, "m/sqrt(s)", "random walk of a standing foot"},
+        Field{"foot_noise", &ProcessNoise::foot, "m/sqrt(s)", "random walk of a stance foot"},
         Field{"foot_noise_vertical", &ProcessNoise::foot_vertical, "m/sqrt(s)", "the same along the vertical"},
         Field{"foot_noise_turns", &ProcessNoise::foot_turns, "-", "that vertical is the foot's (paper, Eq. 2), not that of gravity"},
         Field{"exposure_walk", &ProcessNoise::exposure, "1/sqrt(s)", "random walk of the relative inverse exposure"}};
   }
 };
 
-/// R_I,foot of each standing foot; none for a foot that does not stand (its contact position is then not in use).
+/// R_I,foot of each stance foot; none for a foot that does not stand (its contact position is then not in use).
 using FootOrientations = std::array<std::optional<SO3>, 2>;
 
 /// Moves the estimate from interval.begin to interval.end. `e.t` must be interval.begin and the interval not negative.

@@ -4,6 +4,17 @@
 
 namespace kilvo {
 
+double UsualAcceleration::deviation(const Eigen::Vector3d& accel, double dt) {
+  constexpr double statistics_time = 2.0;  // s
+  constexpr double least_variance = 1e-4;  // (m/s^2)^2
+  if (mean_.isZero(0)) mean_ = accel;
+  const Eigen::Vector3d off = accel - mean_;
+  const double out = (off.array().abs() / (variance_.array() + least_variance).sqrt()).sum();
+  mean_ += dt / statistics_time * off;
+  variance_ += dt / statistics_time * (off.cwiseAbs2() - variance_);
+  return out;
+}
+
 void StationarityDetector::restart() {
   begin_.reset();
   usual_since_.reset();
@@ -35,18 +46,12 @@ void StationarityDetector::add(const ImuSample& s, const Eigen::Vector3d& gyro_b
   accel2_ += s.accel.cwiseAbs2();
   const double dt = last_ ? std::clamp(to_seconds(s.t - *last_), 0.0, 0.1) : 0.0;
   last_ = s.t;
-  constexpr double statistics_time = 2.0, block = 0.25;  // s
-  constexpr double least_variance = 1e-4;                // (m/s^2)^2
-  if (mean_.isZero(0)) mean_ = s.accel;
-  const Eigen::Vector3d off = s.accel - mean_;
-  const double d_a = (off.array().abs() / (variance_.array() + least_variance).sqrt()).sum();
-  mean_ += dt / statistics_time * off;
-  variance_ += dt / statistics_time * (off.cwiseAbs2() - variance_);
-  if (d_a >= theta_) {
+  if (usual_.deviation(s.accel, dt) >= unusual_deviation) {
     usual_since_.reset();
   } else if (!usual_since_) {
     usual_since_ = s.t;
   }
+  constexpr double block = 0.25;  // s
   if (to_seconds(s.t - *begin_) < block) return;
   close_block(gyro_bias);
   begin_.reset();

@@ -1,4 +1,4 @@
-// Whether an IMU stands still.
+// Detects whether an IMU is at rest.
 #pragma once
 
 #include <optional>
@@ -12,14 +12,21 @@ inline constexpr double unusual_deviation = 10;
 /// A mean rate that is larger, beyond the bias that is known, is motion, rad/s.
 inline constexpr double largest_resting_rate = 0.03;
 
-/// What the IMU alone says of the motion: whether it stands still, and how unusual the acceleration is now. No memory of samples, so
-/// that it costs nothing.
+/// Mean and variance of the acceleration over the last seconds.
+class UsualAcceleration {
+ public:
+  /// d_a: the deviation of this sample from the mean, in standard deviations, summed over the axes. `dt`: since the sample before, s.
+  double deviation(const Eigen::Vector3d& accel, double dt);
+
+ private:
+  Eigen::Vector3d mean_ = Eigen::Vector3d::Zero(), variance_ = Eigen::Vector3d::Zero();
+};
+
+/// Detects from IMU samples alone whether the robot stands still, and whether the acceleration is usual. It keeps no samples.
 class StationarityDetector {
  public:
-  /// It stands while the standard deviations of rate (rad/s) and acceleration (m/s^2) are below these. `theta`: an acceleration so many
-  /// standard deviations from its usual is an impact.
-  StationarityDetector(double still_gyro, double still_accel, double theta)
-      : still_gyro_(still_gyro), still_accel_(still_accel), theta_(theta) {}
+  /// The robot stands still while the standard deviations of rate (rad/s) and acceleration (m/s^2) are below these.
+  StationarityDetector(double still_gyro, double still_accel) : still_gyro_(still_gyro), still_accel_(still_accel) {}
 
   /// `gyro_bias`: as far as it is known; what is left of the mean rate is motion.
   void add(const ImuSample& s, const Eigen::Vector3d& gyro_bias);
@@ -32,13 +39,13 @@ class StationarityDetector {
  private:
   void close_block(const Eigen::Vector3d& gyro_bias);
 
-  double still_gyro_, still_accel_, theta_;
+  double still_gyro_, still_accel_;
   std::optional<Time> begin_, last_, usual_since_;
   double n_ = 0;
   Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero(), gyro2_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_ = Eigen::Vector3d::Zero(), accel2_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d resting_gyro_ = Eigen::Vector3d::Zero();
-  Eigen::Vector3d mean_ = Eigen::Vector3d::Zero(), variance_ = Eigen::Vector3d::Zero();
+  UsualAcceleration usual_;
   int quiet_blocks_ = 0;
 };
 

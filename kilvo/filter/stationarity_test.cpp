@@ -28,7 +28,7 @@ std::vector<ImuSample> stream(bool moving, int count) {
 
 TEST(StationarityDetector, StandsAfterHalfASecondOfRestAndNotInMotion) {
   for (const bool moving : {false, true}) {
-    StationarityDetector detector(0.03, 0.4, 10);
+    StationarityDetector detector(0.03, 0.4);
     const auto samples = stream(moving, 150);
     for (int i = 0; i < 90; ++i) detector.add(samples[static_cast<std::size_t>(i)], Eigen::Vector3d::Zero());
     EXPECT_FALSE(detector.stands());
@@ -40,7 +40,7 @@ TEST(StationarityDetector, StandsAfterHalfASecondOfRestAndNotInMotion) {
 TEST(StationarityDetector, AKnownGyroBiasIsNoMotionAndAnUnknownOneIs) {
   const Eigen::Vector3d bias(0.03, -0.04, 0);
   for (const bool known : {false, true}) {
-    StationarityDetector detector(0.03, 0.4, 10);
+    StationarityDetector detector(0.03, 0.4);
     for (ImuSample s : stream(false, 150)) {
       s.gyro += bias;
       detector.add(s, known ? bias : Eigen::Vector3d::Zero());
@@ -50,7 +50,7 @@ TEST(StationarityDetector, AKnownGyroBiasIsNoMotionAndAnUnknownOneIs) {
 }
 
 TEST(StationarityDetector, TakesAnImpactForUnusualAndForgetsIt) {
-  StationarityDetector detector(0.03, 0.4, 10);
+  StationarityDetector detector(0.03, 0.4);
   ImuSample s;
   const auto add = [&](int i, double z) {
     s.t = time_at(0.005 * i);

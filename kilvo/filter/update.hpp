@@ -1,6 +1,6 @@
 // The only Kalman update: iterated, on the manifold, in covariance form (paper, Eqs. 9-10 and the sequential ones; for the Jacobian
 // of the prior: He, Xu, Zhang, "Kalman filters on differentiable manifolds", 2021). Neither the prior covariance nor the information
-// of the measurement is inverted, so both may be singular: a pose that is known, a direction that nobody measures.
+// of the measurement is inverted, so both may be singular: a pose that is known, a direction without a measurement.
 #pragma once
 
 #include <type_traits>

@@ -1,4 +1,4 @@
-// The clearances of one foot in the last moments (paper, Eq. 18) and what their course says (Section V-B).
+// The clearances of one foot over the last second (paper, Eq. 18), with their area and trend (Section V-B).
 #pragma once
 
 #include <array>

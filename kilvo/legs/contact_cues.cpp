@@ -6,8 +6,9 @@
 namespace kilvo {
 namespace {
 
-constexpr double smooth_force = 0.03, smooth_load = 0.02;  // s
-constexpr double shortest_leg = 0.1;                       // m
+constexpr double smooth_force = 0.03, smooth_load = 0.02;        // s
+constexpr double shortest_leg = 0.1;                             // m
+constexpr Duration stop_window = std::chrono::milliseconds(20);  // of a stop; it is over between two samples that are farther apart
 
 Eigen::Vector3d centre_of(const FootPose& foot) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -19,13 +20,12 @@ Eigen::Vector3d centre_of(const FootPose& foot) {
 
 // A foot that comes down is stopped within milliseconds: it has lost more than half of its speed, and its descent has begun to end.
 bool CueTracker::Stop::add(const Sample& s, double threshold) {
-  constexpr Duration window = std::chrono::milliseconds(20);
   constexpr double left_over = 0.45, descent = 0.3, end_of_descent = 0.7;
   samples_[count_++ % most] = s;
   double fastest = 0, down = 0;
   for (std::size_t back = 0; back < std::min(count_, most); ++back) {
     const Sample& old = samples_[(count_ - 1 - back) % most];
-    if (s.t - old.t > window) break;
+    if (s.t - old.t > stop_window) break;
     fastest = std::max(fastest, old.speed);
     down = std::min(down, old.vertical);
   }
@@ -62,10 +62,10 @@ ContactCues CueTracker::update(const Feet& feet, const State& x, const std::arra
   load_ += (1 - std::exp(-out.dt / smooth_load)) * (load - load_);
 
   const double unit = std::sqrt(standard_gravity * leg_length_);
-  constexpr double longest_period = 0.02;  // s; impacts are over between two samples that are farther apart
   for (std::size_t side = 0; side < 2; ++side) {
     out.speed[side] = motion[side].speed / unit;
-    out.impact[side] = stop_[side].add({feet.t, motion[side].velocity.norm(), motion[side].vertical}, threshold) && out.dt < longest_period;
+    out.impact[side] =
+        stop_[side].add({feet.t, motion[side].velocity.norm(), motion[side].vertical}, threshold) && out.dt < to_seconds(stop_window);
   }
   out.height = (motion[0].height - motion[1].height) / leg_length_;
   out.force_side = side_of_force(feet, x);

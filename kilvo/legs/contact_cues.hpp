@@ -1,4 +1,4 @@
-// What a leg sample and the IMU say of the contacts, with the short memory that this needs.
+// The contact cues of a leg sample and the IMU, with the short memory that they need.
 #pragma once
 
 #include <Eigen/Core>

@@ -3,16 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kilvo/filter/stationarity.hpp"
-
 namespace kilvo {
 namespace {
 
-// A foot stands when it is more probable than not.
-constexpr double stands = 0.5;
-constexpr double statistics_time = 2.0;  // s, of the acceleration
-constexpr double normal_time = 0.5;      // s, of the ground's normal
-constexpr double sure_of_foot = 0.8;     // of the foot that shows it
+constexpr double normal_time = 0.5;  // s, of the ground's normal
 
 }  // namespace
 
@@ -27,36 +21,26 @@ void ContactEstimator::start(const Feet& feet, const State& x) {
   started_ = true;
 }
 
-// A foot that carries alone, flat and at rest, lies on the ground as the ground is.
+// A foot in single support, flat and at rest, has the orientation of the ground.
 void ContactEstimator::follow_ground(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion, double dt) {
   for (std::size_t side = 0; side < 2; ++side) {
     const double alone = filter_.probabilities()[side == 0 ? ContactFilter::left : ContactFilter::right];
-    if (alone < sure_of_foot || motion[side].speed > contacts_.fast_sole || motion[side].rolling > contacts_.fast_sole) continue;
+    if (alone < ContactFilter::sure_of_state || motion[side].speed > contacts_.fast_sole || motion[side].rolling > contacts_.fast_sole)
+      continue;
     if (const auto normal = sole_normal(feet.foot[side], x, -x.g.normalized()))
       contacts_.normal = (contacts_.normal + std::min(1.0, dt / normal_time) * (*normal - contacts_.normal)).normalized();
   }
-}
-
-// Deviation of the acceleration from its usual values of the last seconds, in their standard deviations.
-void ContactEstimator::deviate(const Eigen::Vector3d& accel, double dt) {
-  constexpr double least_variance = 1e-4;  // (m/s^2)^2
-  const double share = std::clamp(dt / statistics_time, 0.0, 1.0);
-  if (accel_mean_.isZero(0)) accel_mean_ = accel;
-  const Eigen::Vector3d off = accel - accel_mean_;
-  contacts_.d_a = (off.array().abs() / (accel_variance_.array() + least_variance).sqrt()).sum();
-  accel_mean_ += share * off;
-  accel_variance_ += share * (off.cwiseAbs2() - accel_variance_);
 }
 
 void ContactEstimator::report(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion, const VoxelMap* map) {
   const double unit = std::sqrt(standard_gravity * cues_.leg_length());
   contacts_.sole_speed = filter_.stance_speed() * unit;
   contacts_.fast_sole = filter_.fast_stance() * unit;
-  contacts_.flight = filter_.probabilities()[ContactFilter::none] > stands;
+  contacts_.flight = ContactFilter::is_probable(filter_.probabilities()[ContactFilter::none]);
   for (std::size_t side = 0; side < 2; ++side) {
     const bool stood = contacts_.on[side];
     contacts_.probability[side] = filter_.carries(side);
-    contacts_.on[side] = contacts_.probability[side] > stands;
+    contacts_.on[side] = ContactFilter::is_probable(contacts_.probability[side]);
     if (contacts_.on[side] != stood) contacts_.since[side] = feet.t;
     GroundPatch& ground = contacts_.ground[side];
     if (contacts_.on[side]) {
@@ -81,12 +65,12 @@ const Contacts& ContactEstimator::update(const Feet& feet, const State& x, const
   const double unit = std::sqrt(standard_gravity * std::max(0.1, cues_.leg_length()));
   const double threshold = filter_.threshold_speed() * unit;
   ContactCues cues = cues_.update(feet, x, motion, x.R * accel, threshold);
-  // A velocity that is not known better than what tells standing from swinging says little of either.
+  // A velocity more uncertain than the threshold between stance and swing has little weight.
   cues.known_velocity = 1 / (1 + sigma_v * sigma_v / (threshold * threshold));
   filter_.update(cues);
   const double left = filter_.share_of_left(cues.force_side);
   contacts_.load = {left, 1 - left};
-  deviate(accel, cues.dt);
+  contacts_.d_a = usual_acceleration_.deviation(accel, cues.dt);
   contacts_.t = feet.t;
   report(feet, x, motion, map);
   follow_ground(feet, x, motion, cues.dt);

@@ -5,11 +5,11 @@
 #include <array>
 
 #include "kilvo/filter/state.hpp"
+#include "kilvo/filter/stationarity.hpp"
 #include "kilvo/legs/contact_cues.hpp"
 #include "kilvo/legs/contact_filter.hpp"
 #include "kilvo/legs/foot_motion.hpp"
 #include "kilvo/legs/ground.hpp"
-#include "kilvo/legs/leg_config.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
 
 namespace kilvo {
@@ -36,8 +36,6 @@ struct Contacts {
 
 class ContactEstimator {
  public:
-  explicit ContactEstimator(const LegConfig&) {}
-
   /// `x`: the state at feet.t. `omega`, `accel`: bias-free rate (rad/s) and specific force (m/s^2) of the IMU. `sigma_v`: uncertainty of
   /// the state's velocity, m/s. `map`: where the ground is looked up, if there is one.
   const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel, double sigma_v = 0,
@@ -52,14 +50,13 @@ class ContactEstimator {
   void start(const Feet& feet, const State& x);
   void follow_ground(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion, double dt);
   void report(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion, const VoxelMap* map);
-  void deviate(const Eigen::Vector3d& accel, double dt);
 
   Contacts contacts_;
   bool started_ = false;
   CueTracker cues_;
   ContactFilter filter_;
   GroundLookup ground_;
-  Eigen::Vector3d accel_mean_ = Eigen::Vector3d::Zero(), accel_variance_ = Eigen::Vector3d::Zero();
+  UsualAcceleration usual_acceleration_;
 };
 
 }  // namespace kilvo

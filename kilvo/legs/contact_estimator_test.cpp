@@ -93,7 +93,7 @@ TEST(ContactEstimator, SoftGroundThatThrowsAFootUpByFiveMillimetresIsNoLiftOff) 
 }
 
 TEST(ContactEstimator, ARestartForgetsTheFeetButNotTheRobot) {
-  ContactEstimator estimator{LegConfig{}};
+  ContactEstimator estimator;
   const Gait gait;
   test::watch(estimator, test::walk(gait), 0, 6.25);
   ASSERT_FALSE(estimator.contacts().on[0] && estimator.contacts().on[1]);
@@ -107,7 +107,7 @@ TEST(ContactEstimator, ARestartForgetsTheFeetButNotTheRobot) {
 
 TEST(ContactEstimator, SaysHowSurelyEachFootStands) {
   const Gait gait;
-  ContactEstimator estimator{LegConfig{}};
+  ContactEstimator estimator;
   test::watch(estimator, test::walk(gait), 0, gait.first + gait.cycle() * 3 + gait.swing / 2);
   EXPECT_LT(estimator.contacts().probability[0], 0.05);
   EXPECT_GT(estimator.contacts().probability[1], 0.95);
@@ -117,7 +117,7 @@ TEST(ContactEstimator, SaysHowSurelyEachFootStands) {
 TEST(ContactEstimator, ClearanceIsTheHeightOverTheLastPlaceOfTheFoot) {
   const Gait gait;
   const double apex = gait.first + gait.cycle() * 3 + gait.swing * 2 / 3;
-  ContactEstimator estimator{LegConfig{}};
+  ContactEstimator estimator;
   test::watch(estimator, test::walk(gait), 0, apex);
   EXPECT_NEAR(estimator.contacts().clearance[0], gait.lift, 0.003);
   EXPECT_NEAR(estimator.contacts().clearance[1], 0, 1e-9);

@@ -6,13 +6,11 @@ namespace kilvo {
 namespace {
 
 constexpr double prior_time = 1.0, memory = 3.0;  // s of support, of learning
-// Samples closer together than this say one thing together, s.
+// Samples closer together than this count as one, s.
 constexpr double correlation = 0.005;
-// So sure of a state, its cues are learnt from.
-constexpr double sure_of_state = 0.8;
 // Both feet belong to a walk for so long after one of them carried alone, s.
 constexpr double within_walk = 0.5;
-// What one cue may say at the most: it may be wrong in a way that nobody has thought of.
+// Largest log-likelihood of one cue: it may be wrong for a reason that is not modelled.
 constexpr double most_of_speed = 6, most_of_others = 4;
 // A robot at rest is not slower than this, in ln.
 constexpr double slowest = 0.002;
@@ -173,7 +171,7 @@ void ContactFilter::learn(const ContactCues& cues) {
   }
   for (std::size_t side = 0; side < 2; ++side) {
     Landing& foot = landing_[side];
-    const bool stands = carries(side) > 0.5;
+    const bool stands = is_probable(carries(side));
     if (!stands) swing_time_ += cues.dt;
     if (!stands && foot.stood) foot.seen = false;
     if (stands && !foot.stood) {

@@ -1,5 +1,5 @@
 // Which feet carry: a Bayes filter over the four states of a biped (both feet, the left one, the right one, none). What each cue looks like
-// in each state is learnt from this robot while it walks; docs/decisions/contact.md says why.
+// in each state is learnt from this robot while it walks; see docs/decisions/contact.md.
 #pragma once
 
 #include <array>
@@ -9,12 +9,12 @@
 
 namespace kilvo {
 
-/// What one leg sample says of the contacts, without units: lengths as shares of the leg's length l (height of the IMU over the lower
+/// The contact cues of one leg sample, without units: lengths as shares of the leg's length l (height of the IMU over the lower
 /// sole), speeds as shares of sqrt(g l), the forces as shares of the weight.
 struct ContactCues {
   double dt = 0;                                // since the sample before, s
   std::array<double, 2> speed = {0, 0};         // of the point on which the foot would stand
-  double known_velocity = 1;                    // 0 to 1: how much the speeds say, when the velocity of the body is not well known
+  double known_velocity = 1;                    // 0 to 1: weight of the speeds, by how well the velocity of the body is known
   double height = 0;                            // of the left sole over the right one, along the normal of the ground
   double force_side = 0.5;                      // where the line of the specific force meets the ground: 0 at the right foot, 1 at the left
   double load = 1;                              // specific force
@@ -24,6 +24,9 @@ struct ContactCues {
 class ContactFilter {
  public:
   enum State : std::size_t { both, left, right, none, states };
+  /// From a state that is as probable as this its cues are learnt.
+  static constexpr double sure_of_state = 0.8;
+  static bool is_probable(double probability) { return probability > 0.5; }
 
   ContactFilter();
 
@@ -62,7 +65,7 @@ class ContactFilter {
   RunningStatistics lifted_, level_;                // height of a swinging foot over the other; of two that stand
   RunningStatistics on_left_, on_right_, on_both_;  // where the line of force meets the ground
   double since_support_ = 1e9;                      // s since one foot carried alone
-  // How well impacts tell touchdowns on this robot.
+  // How well impacts indicate touchdowns on this robot.
   struct Landing {
     bool stood = true, seen = false;  // seen: an impact has counted in this swing
     double since_impact = 1e9, since_touchdown = 1e9;

@@ -19,7 +19,7 @@ TEST(ContactEstimator, AWalkThatBecomesAFastOneIsFollowed) {
   fast.lift = 0.12;
   fast.stance = 0.4;
   fast.first = 0;
-  ContactEstimator estimator{LegConfig{}};
+  ContactEstimator estimator;
   test::watch(estimator, test::walk(slow), 0, 5.5);
   test::watch(estimator, test::standing(), 5.5, 6.0);
   // The run begins 6 s later than its own clock.
@@ -39,7 +39,7 @@ TEST(ContactEstimator, ARunThatBecomesASlowWalkIsFollowed) {
   slow.step = 0.25;
   slow.lift = 0.025;
   slow.first = 0;
-  ContactEstimator estimator{LegConfig{}};
+  ContactEstimator estimator;
   test::watch(estimator, test::walk(fast), 0, 6.02);
   test::watch(estimator, test::standing(), 6.02, 7.0);
   Scene later = test::walk(slow);
@@ -53,7 +53,7 @@ TEST(ContactEstimator, ARunThatBecomesASlowWalkIsFollowed) {
 // Begun in mid-walk, the velocity wrong by more than that of the walk: what is left are the heights of the feet.
 TEST(ContactEstimator, OnAnUnknownVelocityMostIsFoundByWhatDoesNotNeedIt) {
   const Gait gait;
-  ContactEstimator estimator{LegConfig{}};
+  ContactEstimator estimator;
   double right = 0, all = 0;
   for (double s = 2; s < 8; s += 0.001) {
     State x = gait.body(s);
@@ -69,7 +69,7 @@ TEST(ContactEstimator, OnAnUnknownVelocityMostIsFoundByWhatDoesNotNeedIt) {
 
 TEST(ContactEstimator, ARobotThatIsAlreadyWalkingIsUnderstoodAfterItsFirstSteps) {
   const Gait gait;
-  ContactEstimator estimator{LegConfig{}};
+  ContactEstimator estimator;
   const std::vector<Change> all = test::watch(estimator, test::walk(gait), 3.1, 9);
   ASSERT_FALSE(all.empty());
   EXPECT_FALSE(all.front().on) << "the foot in the air is noticed";

@@ -6,10 +6,12 @@
 
 #include "kilvo/filter/state.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
+#include "kilvo/sensors/silence.hpp"
 
 namespace kilvo {
 
-inline constexpr double longest_step = 0.05;  // s between samples of the legs; what takes longer counts as that
+/// Between samples of the legs, s; what takes longer counts as that.
+inline constexpr double longest_step = to_seconds(least_silence);
 
 /// Velocity in the world of a point that is at p_I and moves by v_I relative to the IMU, m/s. `omega`: bias-free rate, rad/s.
 inline Eigen::Vector3d velocity_W(const State& x, const Eigen::Vector3d& p_I, const Eigen::Vector3d& v_I, const Eigen::Vector3d& omega) {

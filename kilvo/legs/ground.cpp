@@ -15,7 +15,7 @@ constexpr double reach = 0.1;
 constexpr double same_ground = 0.02;
 // Contacts themselves, m.
 constexpr double contact_sigma = 0.005;
-// Slope across the way, which the feet hardly tell, is taken as level within this.
+// Prior sigma of the slope across the direction of walking, which the feet barely measure.
 constexpr double slope_sigma = 0.1;
 
 }  // namespace
@@ -39,8 +39,8 @@ std::optional<GroundPatch> GroundLookup::of_map(const VoxelMap& map, const Eigen
   return best;
 }
 
-// Height over the newest contact as a linear function of the horizontal way from it: least squares with a level prior, which is the anchor
-// where one or two contacts leave the tilt open.
+// Height over the newest contact as a linear function of the horizontal offset from it: least squares with a level prior, which is the
+// anchor where one or two contacts leave the tilt open.
 std::optional<GroundPatch> GroundLookup::of_contacts(const Eigen::Vector3d& up_W) const {
   if (count_ == 0) return std::nullopt;
   const Eigen::Vector3d a = up_W.unitOrthogonal(), b = up_W.cross(a);
@@ -50,7 +50,7 @@ std::optional<GroundPatch> GroundLookup::of_contacts(const Eigen::Vector3d& up_W
   for (std::size_t back = 0; back < std::min(count_, memory); ++back) {
     const Eigen::Vector3d d = contacts_[(count_ - 1 - back) % memory] - newest;
     const Eigen::Vector3d row(1, a.dot(d), b.dot(d));
-    // Where the ground bends, what lies behind the bend says nothing of what is ahead.
+    // Contacts before a change of slope do not describe the ground ahead.
     if (back > 2 && std::abs(up_W.dot(d) - row.dot(fit)) > same_ground) break;
     A += row * row.transpose() / (contact_sigma * contact_sigma);
     y += row * up_W.dot(d) / (contact_sigma * contact_sigma);

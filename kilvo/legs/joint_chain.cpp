@@ -43,7 +43,7 @@ void add_children(const urdf::Link& link, const Robot& robot, KDL::Tree& tree) {
   }
 }
 
-// Keeps what the parser has to say, instead of letting it print, as long as this lives.
+// Keeps the parser's messages, instead of letting it print, as long as this lives.
 class UrdfLog final : public console_bridge::OutputHandler {
  public:
   UrdfLog() { console_bridge::useOutputHandler(this); }
@@ -109,7 +109,7 @@ JointChain LinkTree::chain(const std::string& from, const std::string& to) const
     next.turns = joint.getType() == KDL::Joint::RotAxis;
     next.slides = joint.getType() == KDL::Joint::TransAxis;
     const bool moves = next.turns || next.slides;
-    // Against the tree's direction a joint is not where its segment ends: the rest of the way belongs to the next joint.
+    // Against the tree's direction a joint is not where its segment ends: the rest belongs to the next joint.
     const Eigen::Vector3d end = to_eigen(at_zero.p), origin = moves ? to_eigen(joint.JointOrigin()) : end;
     const Eigen::Matrix3d turned = to_eigen(at_zero.M);
     next.p += next.R * origin;

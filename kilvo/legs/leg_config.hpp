@@ -27,23 +27,23 @@ struct LegConfig {
   static constexpr auto fields() {
     return std::tuple{
         Field{"contact", &LegConfig::contact, "-",
-              "how contacts are estimated; kilvo: our own way. To be compared with it: paper (Section V as printed), variance (of the "
-              "acceleration), force (a threshold on what the joint efforts carry)"},
-        Field{"velocity_sigma", &LegConfig::velocity_sigma, "m/s", "standard deviation of the velocity of a standing foot"},
+              "how contacts are estimated: kilvo (our method); for comparison: paper (Section V as printed), variance (of the "
+              "acceleration), force (a threshold on the force from the joint efforts)"},
+        Field{"velocity_sigma", &LegConfig::velocity_sigma, "m/s", "standard deviation of the velocity of a stance foot"},
         Field{"vertical_velocity_sigma", &LegConfig::vertical_velocity_sigma, "m/s",
               "the same along the vertical, where soles settle and roll alike at every step; until a LiDAR shows it"},
         Field{"velocity_correlation", &LegConfig::velocity_correlation, "s", "correlation time of that: rows closer together share it"},
-        Field{"position_sigma", &LegConfig::position_sigma, "m", "standard deviation of the position of a standing foot"},
+        Field{"position_sigma", &LegConfig::position_sigma, "m", "standard deviation of the position of a stance foot"},
         Field{"position_correlation", &LegConfig::position_correlation, "s", "correlation time of that"},
         Field{"ground_sigma", &LegConfig::ground_sigma, "m",
               "standard deviation of a foot's height over the map's ground at touchdown, without LiDAR"},
         Field{"entry_delay", &LegConfig::entry_delay, "s",
               "a foot is used this long after the last sample that did not show its touchdown"},
-        Field{"gate", &LegConfig::gate, "sigma", "a standing foot that moves more than this is not used"},
+        Field{"gate", &LegConfig::gate, "sigma", "a stance foot that moves more than this has a smaller weight"},
         Field{"iterations", &LegConfig::iterations, "-", "iterations of one update by the legs at most"},
-        Field{"adaptation", &LegConfig::adaptation, "-",
-              "what a foot that moves is believed (Eq. 8): foot (less, all rows of it alike), row (less, each row for itself), none (as "
-              "much)"},
+        Field{
+            "adaptation", &LegConfig::adaptation, "-",
+            "variance of a foot that moves (Eq. 8): foot (larger, all its rows alike), row (larger, each row by itself), none (the same)"},
         Field{"height", &LegConfig::height, "-",
               "when the height over the ground counts at touchdown: ki (without LiDAR), always (in every modality), never"},
         Field{"ground", &LegConfig::ground, "-",

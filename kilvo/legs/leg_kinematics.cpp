@@ -60,7 +60,7 @@ const std::vector<double>* LegKinematics::Chains::velocity_of(const JointSample&
     const double share = dt / (dt + smoothing);
     for (std::size_t i = 0; i < velocity.size(); ++i) {
       const double difference = (s.position[i] - last_position[i]) / dt;
-      // After a gap or a joint that was not finite the low pass begins anew.
+      // After a gap or a joint that was not finite the low pass restarts.
       velocity[i] = std::isfinite(velocity[i]) ? velocity[i] + share * (difference - velocity[i]) : difference;
     }
   } else {

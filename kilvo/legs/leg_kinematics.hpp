@@ -30,7 +30,7 @@ struct FootPose {
 struct Feet {
   Time t{};
   std::array<FootPose, 2> foot;  // left, right
-  /// Of the ground on each foot, as the joints' efforts say, IMU frame, N; where it is asked for and they are there.
+  /// Of the ground on each foot, from the joints' efforts, IMU frame, N; where it is asked for and they are there.
   std::optional<std::array<Eigen::Vector3d, 2>> force_I;
 };
 

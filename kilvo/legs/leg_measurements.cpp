@@ -52,7 +52,7 @@ void LegModel::add_motion(LegRows& rows, int count, std::size_t side, const Stat
   // Beyond the gate they count as one at the gate does (Huber).
   const double loose_v = foot.variance_scale * std::max(1.0, std::sqrt(chi2_v / gate2)),
                loose_p = foot.variance_scale * std::max(1.0, std::sqrt(chi2_p / gate2));
-  // A density: rows within one correlation time say it once together.
+  // A density: rows within one correlation time count as one.
   const double dt = step_.dt;
   const double along = std::max(1.0, config_.velocity_correlation / dt) * loose_v;
   const Eigen::Vector3d up_W = -x.g.normalized();

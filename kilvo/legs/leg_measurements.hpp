@@ -1,4 +1,4 @@
-// The leg measurement (paper, Eqs. 4 to 8): a standing foot does not move. Rows of all standing feet are stacked in one update.
+// The leg measurement (paper, Eqs. 4 to 8): a stance foot does not move. Rows of all stance feet are stacked in one update.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,7 +16,10 @@ namespace kilvo {
 /// Soles settle and roll: by so much more, in variance, a foot may move before it counts less.
 inline constexpr double room_to_settle = 20;
 
-/// What one leg sample says about one foot.
+/// alpha_s of Eq. 8: the factor on the standard deviation of a row, at most.
+inline constexpr double largest_scale = 10;
+
+/// The measurement of one foot by one leg sample.
 struct Stance {
   bool begins = false;                                   // from now on its contact position is part of the state
   bool ends = false;                                     // from now on it is not
@@ -63,7 +66,7 @@ struct FootHeightRow {
 };
 FootHeightRow foot_height(const GroundPatch& ground, const State& x, const Eigen::Vector3d& pc);
 
-/// The model that `update` calls: velocity and position of each standing foot that passes the gate, and at touchdown its height.
+/// The model that `update` calls: velocity and position of each stance foot that passes the gate, and at touchdown its height.
 class LegModel {
  public:
   static constexpr int max_leg_rows = 14;

@@ -13,9 +13,9 @@ constexpr double lasting = 0.0087, varying = 0.005, gyro_scale = 0.003;
 // Of the bias of a gyro that warms up, rad/s^2: 0.004 rad/s within minutes.
 constexpr double gyro_drift = 2e-5;
 // A load lasts for about so long, s.
-constexpr double memory = 300;
+constexpr double load_memory = 300;
 
-// What a matrix M adds to the way R v of the body, by its columns.
+// Effect of a matrix M on the displacement R v of the body, by its columns.
 Eigen::Matrix<double, 3, 9> effect_of(const Eigen::Matrix3d& R, const Eigen::Vector3d& v) {
   Eigen::Matrix<double, 3, 9> out;
   for (int j = 0; j < 3; ++j) out.middleCols<3>(3 * j) = v[j] * R;
@@ -35,7 +35,7 @@ void LegMotionError::pose_is_measured(const Eigen::Matrix3d& unknown) {
 }
 
 void LegMotionError::add(const State& x, const Eigen::Vector3d& velocity_I, double weight, double dt, bool alone) {
-  if (!x.p.allFinite() || !x.v.allFinite() || !x.R.matrix().allFinite() || !x.g.allFinite()) return;  // a state that is thrown away
+  if (!x.p.allFinite() || !x.v.allFinite() || !x.R.matrix().allFinite() || !x.g.allFinite()) return;  // a state that is discarded
   constexpr double window = 1, longest = 3;                                                           // s
   const Eigen::Vector3d up_W = -x.g.normalized();
   if (alone || !is_known_) {
@@ -68,10 +68,10 @@ void LegMotionError::add(const State& x, const Eigen::Vector3d& velocity_I, doub
 }
 
 void LegMotionError::learn(const Eigen::Vector3d& up_W) {
-  // Of the way of one second, m; of the time that legs stand; Huber's gate.
+  // Noise of the displacement of one second, m; share of time in stance; Huber's gate.
   constexpr double sigma = 0.0025, least_weight = 0.1, gate2 = 9;
   const Comparison c = *std::exchange(comparison_, std::nullopt);
-  P_.diagonal().array() += lasting * lasting * c.time / memory;
+  P_.diagonal().array() += lasting * lasting * c.time / load_memory;
   if (c.weight < least_weight * c.time) return;
   const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - up_W * up_W.transpose()) * (c.time / c.weight);
   const Effect H = across * c.effect;

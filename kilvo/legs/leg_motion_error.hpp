@@ -1,10 +1,10 @@
 // What a robot that is not quite as described does to the motion that its legs and gyro measure: the mount of the IMU on the legs' link,
 // the lengths of the legs, soles that roll on with every step, the scale of the gyro. Such an error is the same at every step, so that no
-// noise term models it: it grows with the way, and a way back undoes it in part.
+// noise term models it: it grows with the distance, and the way back cancels a part.
 //
 // Where the body moves with v the legs measure (I + M) v. M is learnt while something else measures the pose. While nothing does, what is
 // not known of M, the scale of the gyro and the drift of its bias (it warms up) are parameters that are considered, not estimated (Schmidt
-// 1966): their effect on the pose is summed up along the way.
+// 1966): their effect on the pose is accumulated along the path.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +24,7 @@ class LegMotionError {
 
   /// Something else has measured the pose, but for the position along `unknown` (takes an error of the position to its part there).
   void pose_is_measured(const Eigen::Matrix3d& unknown);
-  /// The next state. `velocity_I`: of the IMU as the standing feet measure it, m/s; `weight`: of that, 0 where none stands; `alone`:
+  /// The next state. `velocity_I`: of the IMU as the stance feet measure it, m/s; `weight`: of that, 0 where none stands; `alone`:
   /// nothing else measures the motion.
   void add(const State& x, const Eigen::Vector3d& velocity_I, double weight, double dt, bool alone);
   /// To be added to the covariance of `x`, a state at or after the last one that was added.

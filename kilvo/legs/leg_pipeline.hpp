@@ -3,14 +3,40 @@
 #pragma once
 
 #include <array>
+#include <variant>
 
 #include "kilvo/filter/state.hpp"
-#include "kilvo/legs/contact_detector.hpp"
+#include "kilvo/legs/contact_estimator.hpp"
 #include "kilvo/legs/leg_motion_error.hpp"
 #include "kilvo/legs/level_ground.hpp"
+#include "kilvo/legs/paper_contacts.hpp"
+#include "kilvo/legs/simple_contacts.hpp"
 #include "kilvo/legs/stance_tracker.hpp"
 
 namespace kilvo {
+
+/// The contact estimation that legs.contact names.
+class ContactDetector {
+ public:
+  /// Throws std::invalid_argument when config.contact names none.
+  explicit ContactDetector(const LegConfig& config);
+
+  /// See ContactEstimator::update. `sigma_v`: uncertainty of the velocity of x, m/s.
+  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel, double sigma_v = 0,
+                         const VoxelMap* map = nullptr);
+  const Contacts& contacts() const;
+
+  /// After a gap in the legs' messages, or when no foot could be used for long.
+  void restart();
+
+  /// The detector's own view of the noise of a leg sample's rows (Eq. 8), where it has one. `x`: before the update; `gyro`: as measured,
+  /// rad/s. `ground`: whether the height of the feet counts.
+  void adapt(LegStep& step, const State& x, const Eigen::Vector3d& gyro, StanceTracker::Ground ground);
+
+ private:
+  std::variant<ContactEstimator, PaperContactEstimator, VarianceContacts, ForceContacts> detector_;
+  double ground_sigma_;  // m
+};
 
 class LegPipeline {
  public:
@@ -21,8 +47,8 @@ class LegPipeline {
         always_height_(config.height == "always"),
         has_level_ground_(config.height != "never" && config.ground != "contacts") {}
 
-  /// What the feet say of `predicted`, the estimate of their time, and what that took. `imu`: of the feet's time. `map`: on whose planes
-  /// the feet stand, if any. Allocates nothing.
+  /// The measurement of `predicted`, the estimate of their time, by the feet, and its computing time. `imu`: of the feet's time. `map`: on
+  /// whose planes the feet stand, if any. Allocates nothing.
   struct LegUpdate {
     LegStep step;
     double contact_us = 0;  // the contacts' part of the time
@@ -33,7 +59,7 @@ class LegPipeline {
   void judge(const LegStep& step, const std::array<bool, 2>& passed) { stances_.judge(step, passed); }
 
   /// On the legs alone one foot carries unless the IMU measures a flight, and a long one is none: true when none has carried for so long
-  /// that all begins anew.
+  /// that all restarts.
   bool has_lost_its_stance(const LegStep& step, bool on_legs_alone);
   /// No foot is missed before `t`.
   void expect_a_stance_from(Time t) { last_stance_ = t; }

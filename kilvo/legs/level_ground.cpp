@@ -140,7 +140,7 @@ void LevelGround::find_floor(const Eigen::Vector3d& p_W, const Estimate& e) {
 }
 
 std::optional<GroundPatch> LevelGround::touchdown(std::size_t side, const Eigen::Vector3d& p_W, const Estimate& e) {
-  if (!p_W.allFinite() || !e.x.R.matrix().allFinite() || !(e.x.g.norm() > 0)) return std::nullopt;  // a state that is thrown away
+  if (!p_W.allFinite() || !e.x.R.matrix().allFinite() || !(e.x.g.norm() > 0)) return std::nullopt;  // a state that is discarded
   if (++touchdowns_ == touchdowns_of_a_walk) first_ = e.t;
   if (last_) learn(p_W - *last_, e.x.R);
   find_vertical(e);

@@ -1,14 +1,14 @@
 // Whether the ground on which a robot walks is level, judged by its footholds alone, and then how high it is.
 //
 // A robot that is not quite as described (its IMU pitched, its encoders off) measures a climb at each step on level ground: the same share
-// of the step in its own frame, whichever way it goes. A slope stays where it is in the world while the robot turns. The height of a step d
-// is
+// of the step in its own frame, in any direction of walking. A slope stays where it is in the world while the robot turns. The height of a
+// step d is
 //   h = m'd_I + s'd_W + noise
 // where m (m/m, IMU frame) is what the legs climb too much, and s (m/m, world frame) the slope of the ground. Two hypotheses, level and
 // sloped, each with a Kalman filter of (m, s), mixed as interacting models are (Blom and Bar-Shalom 1988). Floors are level more often than
 // not, and descriptions are off by no more than a degree or so: these priors decide while the robot walks straight on.
 //
-// On level ground the footholds tell the filter where up is, too, until the world has been levelled (Levelling).
+// On level ground the footholds also measure the vertical, until the world has been levelled (Levelling).
 #pragma once
 
 #include <Eigen/Core>

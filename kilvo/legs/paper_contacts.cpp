@@ -42,7 +42,7 @@ void PaperContactEstimator::start(const Feet& feet, const State& x, const std::a
   if (!static_known_) static_ = {};
   first_swing_.reset();
   impact_.reset();
-  // The LiDAR does not see the ground at the feet yet: it is that of the two standing feet, level across (the anchor point).
+  // The LiDAR does not see the ground at the feet yet: it is that of the two stance feet, level across (the anchor point).
   ground_.forget();
   touchdowns_ = 0;
   for (const FootMotionNow& m : motion) ground_.stands_at(m.lowest);
@@ -78,7 +78,7 @@ void PaperContactEstimator::learn(std::size_t side, const Residual& r) {
 PaperContactEstimator::Residual PaperContactEstimator::row_scale(const Residual& r) const {
   if (!initialised() || swing_.residual.count() == 0) return Residual::Ones();
   // As printed (d / max d) a row without deviation would have no noise at all, and the largest always alpha_s.
-  return (swing_.residual.deviation(r, least_residual) / theta_d).cwiseMax(1.0).cwiseMin(alpha_s);
+  return (swing_.residual.deviation(r, least_residual) / unusual_deviation).cwiseMax(1.0).cwiseMin(largest_scale);
 }
 
 void PaperContactEstimator::lift_off(std::size_t side, Time t) {
@@ -127,8 +127,8 @@ bool PaperContactEstimator::has_larger_area(std::size_t side) const {
 // Of a foot in the air. `impact`: the acceleration's cue is active.
 bool PaperContactEstimator::lands(std::size_t side, bool impact, double d_fv, Time t) {
   FootState& f = foot_[side];
-  if (f.fast.update(d_fv > theta_d, t)) f.was_fast = true;
-  const bool slow = d_fv < theta_d;
+  if (f.fast.update(d_fv > unusual_deviation, t)) f.was_fast = true;
+  const bool slow = d_fv < unusual_deviation;
   if (f.was_fast && slow) f.passed_peak = true;
   const bool slow_long = f.slow.update(slow, t);
   if (!f.passed_peak) return false;
@@ -154,7 +154,7 @@ const Contacts& PaperContactEstimator::update(const Feet& feet, const State& x, 
 
   const Reference& reference = initialised() ? swing_ : static_;
   contacts_.d_a = reference.accel.deviation(accel, least_accel).sum();  // Eq. 19
-  const bool impact = impact_.update(contacts_.d_a > theta_d, feet.t);
+  const bool impact = impact_.update(contacts_.d_a > unusual_deviation, feet.t);
   for (std::size_t side = 0; side < 2; ++side) {
     FootState& f = foot_[side];
     const FootMotionNow& m = motion[side];
@@ -165,10 +165,10 @@ const Contacts& PaperContactEstimator::update(const Feet& feet, const State& x, 
     contacts_.ground[side] = f.ground;
     if (still) continue;
     if (contacts_.on[side]) {
-      f.settled = f.settled || f.calm.update(contacts_.d_a < theta_d, feet.t) || !initialised();
+      f.settled = f.settled || f.calm.update(contacts_.d_a < unusual_deviation, feet.t) || !initialised();
       // In the first step one foot supports: what it does meanwhile is S_sw.
       const bool may_lift = f.settled && (initialised() || contacts_.on[1 - side]);
-      if (f.moving.update(d_fv > theta_d, feet.t) && may_lift) lift_off(side, feet.t);
+      if (f.moving.update(d_fv > unusual_deviation, feet.t) && may_lift) lift_off(side, feet.t);
     } else if (lands(side, impact, d_fv, feet.t)) {
       touchdown(side, feet.t, m, x, map);
     }

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "kilvo/legs/clearance_window.hpp"
-#include "kilvo/legs/contact_estimator.hpp"
+#include "kilvo/legs/leg_measurements.hpp"
 #include "kilvo/legs/signal_statistics.hpp"
 
 namespace kilvo {
@@ -27,9 +27,7 @@ class HeldCue {
 
 class PaperContactEstimator {
  public:
-  static constexpr double theta_d = 10;  // Section V-B
-  static constexpr int N_d = 5;          // frames
-  static constexpr double alpha_s = 10;  // Eq. 8
+  static constexpr int N_d = 5;  // frames
 
   /// Velocity, position and height of a supporting foot: the rows of r_c (Eq. 7).
   using Residual = Eigen::Matrix<double, 7, 1>;

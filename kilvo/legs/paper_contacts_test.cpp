@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "kilvo/legs/contact_detector.hpp"
+#include "kilvo/legs/leg_pipeline.hpp"
 #include "tests/helpers/contact_watch.hpp"
 
 namespace kilvo {
@@ -114,7 +114,7 @@ TEST(PaperContacts, AJoltInMidSwingSetsNoFootDown) {  // the swing peak
   for (int i = 0; i < 30; ++i) {
     const double s = s0 + 1e-3 * i;
     walker.step(walker.feet(s), walker.gait.body(s), {5, 5, 40}, s);
-    EXPECT_GT(walker.contacts.contacts().d_a, PaperContactEstimator::theta_d);
+    EXPECT_GT(walker.contacts.contacts().d_a, unusual_deviation);
     EXPECT_FALSE(walker.contacts.contacts().on[0]) << i;
   }
 }
@@ -195,7 +195,7 @@ TEST(PaperContacts, EachRowIsLoosenedByItsOwnDeviation) {  // Eq. 8
   EXPECT_DOUBLE_EQ(scale[3], 1);
   EXPECT_NEAR(scale[4], 1.5, 0.15);  // 15 deviations
   far[2] = 10;
-  EXPECT_DOUBLE_EQ(walker.contacts.row_scale(far)[2], PaperContactEstimator::alpha_s);
+  EXPECT_DOUBLE_EQ(walker.contacts.row_scale(far)[2], largest_scale);
 }
 
 TEST(ContactDetector, IsTheOneThatTheSettingNames) {

@@ -1,5 +1,5 @@
-// Two common ways of contact estimation, for comparison (the paper's Tables I and II): a threshold on the ground's force, and the variance
-// of the acceleration. Selected by legs.contact: force, variance.
+// Two common methods of contact estimation, for comparison (the paper's Tables I and II): a threshold on the ground's force, and the
+// variance of the acceleration. Selected by legs.contact: force, variance.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace kilvo {
 
-/// Time, clearance and phase, which every way reports alike.
+/// Time, clearance and phase, which every method reports alike.
 class ContactReport {
  public:
   const Contacts& contacts() const { return contacts_; }

@@ -31,7 +31,7 @@ void SoleNoise::add(std::size_t side, const Eigen::Vector3d& velocity_W, const E
   const Eigen::Vector3d mean = sum.way / sum.time;
   const double up = up_W.dot(mean);
   sum = {};
-  if (!mean.allFinite()) return;  // of a state that is thrown away
+  if (!mean.allFinite()) return;  // of a state that is discarded
   across_.add(0.5 * (mean.squaredNorm() - up * up), 1);
   if (sigma_v) {
     add_rise(side, up, *sigma_v * *sigma_v);

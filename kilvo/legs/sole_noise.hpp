@@ -12,10 +12,10 @@
 
 namespace kilvo {
 
-/// Velocity of a contact point, averaged over the correlation time of its noise: a sole that rolls, slides, gives way or is measured badly
-/// does so for all of that time. Never less than the settings say (of the vertical, once a LiDAR has shown it, of the horizontal).
+/// Velocity of a contact point, averaged over the correlation time of its noise: a sole that rolls, slides, deforms or is measured badly
+/// does so for all of that time. Never less than the settings (of the vertical, once a LiDAR has shown it, of the horizontal).
 ///
-/// While nothing but the legs measures the vertical velocity, noise and error of the state are told apart as Mehra (1970) does: the noise
+/// While nothing but the legs measures the vertical velocity, noise and error of the state are separated as by Mehra (1970): the noise
 /// of a stance is its own, so that what successive stances of opposite feet have in common is an error of the state.
 class SoleNoise {
  public:

@@ -12,19 +12,16 @@ namespace {
 constexpr double rolling_speed = 0.005;
 // The same as a share of what a supporting sole seems to move by.
 constexpr double rolling_share = 0.3;
-// alpha_s of Eq. 8, of the standard deviation.
-constexpr double loosest = 10;
 // Beyond the gate for so long, a foot has another place.
 constexpr Duration longest_refusal = std::chrono::milliseconds(20);
-// Encoders that repeat every bit for so long, while the other foot's do not and the body turns faster than this (rad/s), are frozen.
-constexpr Duration longest_stillness = std::chrono::milliseconds(50);
+// Encoders that repeat every bit, while the other foot's do not and the body turns faster than this (rad/s), are frozen.
 constexpr double surely_turning = 0.1;
 // How much one touchdown counts in what is learned of the ground.
 constexpr double sink_share = 0.15;
-// A foot enters loosely and settles over this time, s.
+// The variance of a new stance foot decreases over this time, s.
 constexpr double entry_time = 0.02;
 constexpr double shortest_step = 1e-4;  // s
-// What descriptions and sinking soles make of the way as height: both feet show it, and it is no error of the state.
+// Height per distance from errors of the description and sinking soles: both feet show it, and it is no error of the state.
 constexpr double described_share = 0.015;
 
 // How much each corner of a sole carries, which adds up to one.
@@ -46,13 +43,13 @@ std::array<double, max_corners> share_of_corners(const FootPose& pose, const Sta
   return out;
 }
 
-// Eq. 8 for each row by itself: how much more it deviates than its noise says.
+// Eq. 8 for each row by itself: how much more it deviates than its noise.
 Eigen::Matrix<double, 7, 1> scale_of_rows(const Eigen::Vector3d& velocity, double velocity2, const Eigen::Vector3d& position,
                                           double position2) {
   Eigen::Matrix<double, 7, 1> out = Eigen::Matrix<double, 7, 1>::Ones();
   out.head<3>() = (velocity.cwiseAbs2() / velocity2).cwiseMax(1.0);
   out.segment<3>(3) = (position.cwiseAbs2() / position2).cwiseMax(1.0);
-  return out.cwiseMin(loosest * loosest);
+  return out.cwiseMin(largest_scale * largest_scale);
 }
 
 }  // namespace
@@ -67,9 +64,9 @@ StanceTracker::StanceTracker(const LegConfig& config)
       by_contacts_(config.ground == "contacts") {}
 
 void StanceTracker::restart() {
-  for (std::size_t side = 0; side < 2; ++side) {
-    leave_[side] = leave_[side] || weights_[side].has_value();
-    weights_[side].reset();
+  for (Foot& foot : feet_) {
+    foot.leaves = foot.leaves || foot.weights.has_value();
+    foot.weights.reset();
   }
   last_.reset();
   noise_.restart();
@@ -77,15 +74,16 @@ void StanceTracker::restart() {
 
 void StanceTracker::judge(const LegStep& step, const std::array<bool, 2>& passed) {
   for (std::size_t side = 0; side < 2; ++side) {
+    Foot& foot = feet_[side];
     if (!step.foot[side].used || passed[side]) {
-      refused_[side].reset();
+      foot.refused_since.reset();
       continue;
     }
-    if (!refused_[side]) refused_[side] = step.t;
-    if (step.t - *refused_[side] < longest_refusal) continue;
-    refused_[side].reset();
-    leave_[side] = true;
-    weights_[side].reset();
+    if (!foot.refused_since) foot.refused_since = step.t;
+    if (step.t - *foot.refused_since < longest_refusal) continue;
+    foot.refused_since.reset();
+    foot.leaves = true;
+    foot.weights.reset();
   }
 }
 
@@ -106,7 +104,7 @@ std::optional<GroundPatch> StanceTracker::ground_under(const VoxelMap& map, cons
   return patch;
 }
 
-// The feet whose rows are used. Of a robot that does not fly one carries at any time: when none is believed to, the more probable.
+// The feet whose rows are used. Without a flight one foot is always in contact: when none is detected, the more probable.
 std::array<bool, 2> StanceTracker::carriers(const Contacts& contacts, double dt) const {
   std::array<bool, 2> out = contacts.on;
   const auto [left, right] = contacts.probability;
@@ -129,7 +127,7 @@ std::optional<GroundPatch> StanceTracker::level_with_other(std::size_t side, con
   constexpr double least_step = 0.005, most_step = 0.03, stair = 0.1;  // m
   // The normal of the ground is off by the same for many steps.
   constexpr double doubt = 2;
-  if (!weights_[1 - side]) return std::nullopt;
+  if (!feet_[1 - side].weights) return std::nullopt;
   const double height = normal_W.dot(p_W - x.pc[1 - side]);
   const double sigma = std::clamp(doubt * step_height_.rms(), least_step, most_step);
   if (std::abs(height) < stair) step_height_.add(height, 1);
@@ -153,10 +151,11 @@ void StanceTracker::add_ground(std::size_t side, Stance& foot, const State& x, c
 // True while the encoders of this foot are frozen.
 bool StanceTracker::stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega) {
   const FootPose& now = feet.foot[side];
-  FootPose& last = last_pose_[side];
-  if (now.corners != last.corners || now.p[0] != last.p[0] || now.v[0] != last.v[0]) changed_[side] = feet.t;
-  last = now;
-  return feet.t - changed_[side] > longest_stillness && changed_[1 - side] > changed_[side] && omega.norm() > surely_turning;
+  Foot& foot = feet_[side];
+  const FootPose& last = foot.last_pose;
+  if (now.corners != last.corners || now.p[0] != last.p[0] || now.v[0] != last.v[0]) foot.changed = feet.t;
+  foot.last_pose = now;
+  return feet.t - foot.changed > least_silence && feet_[1 - side].changed > foot.changed && omega.norm() > surely_turning;
 }
 
 LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const State& x, const Eigen::Vector3d& omega, double sigma_v,
@@ -172,32 +171,33 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
   for (std::size_t side = 0; side < 2; ++side) {
     const FootPose& pose = feet.foot[side];
     Stance& foot = out.foot[side];
-    foot.ends = std::exchange(leave_[side], false);
+    Foot& state = feet_[side];
+    foot.ends = std::exchange(state.leaves, false);
     foot.R_IF = pose.R_IF;
     // It came down at some time since the sample before the one that shows it.
     const double phase = contacts.phase(side) + out.dt;
     const double rolling = std::max(rolling_speed, rolling_share * contacts.sole_speed);
     const auto weights = share_of_corners(pose, x, omega, rolling);
     if (stuck(side, feet, omega) || !carries[side]) {
-      foot.ends = foot.ends || weights_[side].has_value();
-      weights_[side].reset();
+      foot.ends = foot.ends || state.weights.has_value();
+      state.weights.reset();
       noise_.interrupt(side);
       continue;
     }
-    foot.begins = !weights_[side].has_value();
+    foot.begins = !state.weights.has_value();
     foot.used = true;
     for (std::size_t k = 0; k < static_cast<std::size_t>(pose.corners); ++k) {
       foot.point.p += weights[k] * pose.p[k];
       foot.point.v += weights[k] * pose.v[k];
-      if (!foot.begins) foot.shift += (weights[k] - (*weights_[side])[k]) * pose.p[k];
+      if (!foot.begins) foot.shift += (weights[k] - (*state.weights)[k]) * pose.p[k];
     }
-    weights_[side] = weights;
+    state.weights = weights;
     if (foot.begins && has_heights_) add_ground(side, foot, x, support.map, contacts.normal, support.ground);
-    // Eq. 8: what moves is believed less; so is what has just arrived.
+    // Eq. 8: a moving foot has a larger variance; so has one that has just touched down.
     const Eigen::Vector3d velocity = velocity_W(x, foot.point.p, foot.point.v, omega);
-    if (foot.begins) sole_velocity_[side] = velocity;
-    sole_velocity_[side] += std::min(1.0, 2 * out.dt / entry_time) * (velocity - sole_velocity_[side]);
-    const double moving2 = sole_velocity_[side].squaredNorm();
+    if (foot.begins) state.sole_velocity = velocity;
+    state.sole_velocity += std::min(1.0, 2 * out.dt / entry_time) * (velocity - state.sole_velocity);
+    const double moving2 = state.sole_velocity.squaredNorm();
     if (phase > config_.entry_delay + entry_time)
       noise_.add(side, velocity, -x.g.normalized(), out.dt,
                  support.on_legs_alone ? std::optional(std::hypot(sigma_v, described_share * x.v.norm())) : std::nullopt);
@@ -206,13 +206,13 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     // What still slides as it comes down takes its contact position along. Later only an error of the state would seem to slide for long.
     if (entering > 0) foot.slide_variance = velocity.squaredNorm() * entry_time * out.dt;
     // As much as the noise across on all three axes is no motion.
-    const double loose = 1.0 + (by_foot_ ? std::max(0.0, moving2 / noise2 - 3.0) : 0.0) + (loosest - 1) * entering;
+    const double loose = 1.0 + (by_foot_ ? std::max(0.0, moving2 / noise2 - 3.0) : 0.0) + (largest_scale - 1) * entering;
     if (by_row_ && !foot.begins)
       foot.row_scale = scale_of_rows(velocity, noise2, foot_position(x, foot.point, x.pc[side] + x.R * foot.shift).r,
                                      room_to_settle * config_.position_sigma * config_.position_sigma);
     // Of two feet that stand, the lighter one counts less: a sole that carries little slides and rolls.
     const double lighter = carries[1 - side] ? std::max(1.0, contacts.load[1 - side] / contacts.load[side]) : 1.0;
-    foot.variance_scale = std::min(lighter * loose / contacts.probability[side], loosest * loosest);
+    foot.variance_scale = std::min(lighter * loose / contacts.probability[side], largest_scale * largest_scale);
   }
   out.rise = noise_.take_rise();
   return out;

@@ -47,16 +47,20 @@ class StanceTracker {
                                               const Eigen::Vector3d& normal_W);
   void add_ground(std::size_t side, Stance& foot, const State& x, const VoxelMap* map, const Eigen::Vector3d& normal_W, Ground ground);
   bool stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega);
+  struct Foot {
+    std::optional<Weights> weights;                           // of the corners, in stance
+    bool leaves = false;                                      // the filter at the next step
+    std::optional<Time> refused_since;                        // its rows are beyond the gate
+    Eigen::Vector3d sole_velocity = Eigen::Vector3d::Zero();  // in stance, averaged, in the world, m/s
+    FootPose last_pose;
+    Time changed{};  // when its encoders last changed
+  };
+
   LegConfig config_;
   std::optional<Time> last_;
-  std::array<std::optional<Weights>, 2> weights_;  // of each standing foot
-  double sink_ = 0, sink_variance_ = 0;            // of the feet over the map's planes, as learned, m
-  std::array<bool, 2> leave_ = {false, false};
-  RunningStatistics step_height_;                 // of a foot that comes down, over the plane through the other, m
-  std::array<std::optional<Time>, 2> refused_;    // since when
-  std::array<Eigen::Vector3d, 2> sole_velocity_;  // of each standing foot, averaged, in the world, m/s
-  std::array<FootPose, 2> last_pose_;
-  std::array<Time, 2> changed_{};  // when the encoders of the foot last said something new
+  std::array<Foot, 2> feet_;
+  double sink_ = 0, sink_variance_ = 0;  // of the feet over the map's planes, as learned, m
+  RunningStatistics step_height_;        // of a foot that comes down, over the plane through the other, m
   SoleNoise noise_;
   bool by_foot_, by_row_, has_heights_, by_contacts_;  // of the settings
   GroundLookup places_;                                // of the touchdowns

@@ -19,7 +19,7 @@ test::SoleMotion standing(std::size_t side) { return {{0, side == 0 ? 0.1 : -0.1
 TEST(StanceTracker, AFootEntersAfterItsDelayLooselyAndLeavesWithItsContact) {
   test::Gait gait;
   LegConfig config;
-  ContactEstimator contacts(config);
+  ContactEstimator contacts;
   StanceTracker tracker(config);
   std::array<bool, 2> inside = {false, false};
   int entered = 0, left = 0, loose = 0;
@@ -53,7 +53,7 @@ TEST(StanceTracker, AFootEntersAfterItsDelayLooselyAndLeavesWithItsContact) {
 
 TEST(StanceTracker, AFootThatIsBeyondItsGateForLongEntersAnewWhereItIs) {
   LegConfig config;
-  ContactEstimator contacts(config);
+  ContactEstimator contacts;
   StanceTracker tracker(config);
   const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
   int ended = 0, began_again = 0;
@@ -209,7 +209,7 @@ TEST(StanceTracker, AtALowRateAFootDoesNotWaitForASampleMoreThanItsDelay) {
 TEST(StanceTracker, AFootWhoseEncodersAreFrozenWhileTheBodyTurnsIsNotUsed) {
   for (const double rate : {0.0, 0.5}) {
     LegConfig config;
-    ContactEstimator contacts(config);
+    ContactEstimator contacts;
     StanceTracker tracker(config);
     const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
     LegStep step;
@@ -234,7 +234,7 @@ TEST(StanceTracker, TheGroundCountsOnceAtEachTouchdownAndOnlyWhereThereIsAMap) {
   test::Gait gait;
   for (const VoxelMap* ground : {static_cast<const VoxelMap*>(nullptr), static_cast<const VoxelMap*>(&map)}) {
     LegConfig config;
-    ContactEstimator contacts(config);
+    ContactEstimator contacts;
     StanceTracker tracker(config);
     int entered = 0, with_ground = 0;
     for (int i = 0; i < 4000; ++i) {

@@ -3,20 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kilvo/sensors/silence.hpp"
+
 namespace kilvo {
 namespace {
 
 constexpr double block = 0.1;         // s
-constexpr double surely = 0.9;        // probability of each foot, throughout
-constexpr double longest_gap = 0.05;  // s, between samples
+constexpr double sure_of_both = 0.9;  // probability of each foot, throughout
 constexpr std::size_t shortest = 15;  // blocks of a line
 constexpr std::size_t settling = 5;   // blocks: a stand settles for any number of these first
 // White noise of the gyro over half a second, rad/s: it is in the angle's slope and not beside its line.
 constexpr double white = 3e-4, white_time = 0.5;
-// Before anything is seen of how a standing body sways, rad, as so many angles say.
+// Prior of the sway of a standing body, rad, with the weight of so many angles.
 constexpr double usual_sway = 1e-3, usual_count = 2;
-constexpr double hidden = 0.5;  // of a turn, by soles and joints that give way
-// What says less is the beginning of a walk, or sway that is slower than the stand, rad/s.
+constexpr double hidden = 0.5;  // of a turn, by compliance of soles and joints
+// A larger sigma is the beginning of a walk, or sway slower than the standing phase, rad/s.
 constexpr double largest_sigma = 1e-3;
 
 }  // namespace
@@ -67,14 +68,14 @@ GyroBiasReading StandingRate::line(std::size_t first) const {
   }
   const double alike = std::clamp(together / std::max(beside, 1e-12), 0.0, 0.95);
   const double variance = (beside + usual_count * usual_sway * usual_sway) / (3 * (n - 2) + usual_count);
-  // Soles that give way hide a part of a turn, and what they do not agree upon is at least as much.
+  // Compliant soles hide a part of a turn; their disagreement is a lower bound of it.
   const double unseen2 = (hidden * hidden * turn.squaredNorm() + apart.squaredNorm()) / (squares * squares);
   const double white2 = white * white * white_time / (angles_[count_ - 1].time - angles_[first].time);
   out.sigma = std::sqrt(variance * (1 + alike) / (1 - alike) / squares + unseen2 + white2);
   return out;
 }
 
-// Of the lines that leave out the settling, the one that is known best; and of that, what has not been said.
+// Of the lines without the settling, the one with the smallest sigma; and of that, the information that is new.
 std::optional<GyroBiasReading> StandingRate::news() {
   if (count_ < shortest || count_ % settling != 0) return std::nullopt;  // seldom, since many lines take their time
   GyroBiasReading best = line(0);
@@ -95,11 +96,11 @@ std::optional<GyroBiasReading> StandingRate::news() {
 std::optional<GyroBiasReading> StandingRate::add(const Feet& feet, const Contacts& contacts, const Eigen::Vector3d& gyro) {
   // A foot of which only a point is known does not show how the body turns.
   constexpr int fewest_corners = 3;
-  const bool stands = contacts.probability[0] > surely && contacts.probability[1] > surely && feet.foot[0].corners >= fewest_corners &&
-                      feet.foot[1].corners >= fewest_corners;
+  const bool stands = contacts.probability[0] > sure_of_both && contacts.probability[1] > sure_of_both &&
+                      feet.foot[0].corners >= fewest_corners && feet.foot[1].corners >= fewest_corners;
   const double dt = stands_ ? to_seconds(feet.t - last_) : 0;
   last_ = feet.t;
-  const bool goes_on = stands && stands_ && dt <= longest_gap && count_ < most;
+  const bool goes_on = stands && stands_ && dt <= to_seconds(least_silence) && count_ < most;
   stands_ = stands;
   if (!stands) return std::nullopt;
   if (!goes_on) {

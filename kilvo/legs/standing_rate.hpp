@@ -1,4 +1,4 @@
-// The gyro's bias from two feet that stand: what it says beyond the turn that both soles see.
+// The gyro's bias from two feet in stance: its rate beyond the rotation that both soles measure.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,12 +17,13 @@ struct GyroBiasReading {
   double sigma = 0;
 };
 
-/// The angle between what the gyro adds up to and what the soles see grows by the bias. A body that sways on soles that give way and
+/// The angle between the integrated gyro and the soles grows by the bias. A body that sways on compliant soles and
 /// encoders of coarse steps leave an error that does not grow: the bias is the slope of the line through the angle over the whole stand,
-/// and what the angle deviates from that line tells how well it is known.
+/// and what the angle deviates from that line gives its sigma.
 class StandingRate {
  public:
-  /// One leg sample; `gyro` as measured, rad/s. A reading whenever the stand knows twice as much as it has said; each says what is new.
+  /// One leg sample; `gyro` as measured, rad/s. A reading whenever the information of the standing phase has grown enough; each has only
+  /// the new part.
   std::optional<GyroBiasReading> add(const Feet& feet, const Contacts& contacts, const Eigen::Vector3d& gyro);
 
  private:

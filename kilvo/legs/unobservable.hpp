@@ -1,4 +1,4 @@
-// What legs do not correct though their rows would, and what they may say of it.
+// States that the legs do not correct although their rows would, and the part that they may measure.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@
 namespace kilvo {
 
 /// Heading and the gyro's bias about the vertical, as unit vectors of the error state. Two soles that stand seem to hold the heading, but
-/// they turn on the ground, and always the same way in a turn.
+/// they turn on the ground, and always in the same direction in a turn.
 using Heading = Eigen::Matrix<double, at::size, 2>;
 Heading heading_of(const State& x);
 
@@ -39,7 +39,7 @@ void consider(const State& prior, const Gain<Max>& gain, Estimate& posterior) {
   posterior.P.block<3, 3>(at::bg, at::bg) += bias * along;
 }
 
-/// Two feet that stand see how the body turns: the rest of what the gyro says is bias.
+/// Two feet in stance measure the body's rotation: the rest of the gyro's rate is bias.
 Estimate with_gyro_bias(const Estimate& e, const GyroBiasReading& reading);
 
 }  // namespace kilvo

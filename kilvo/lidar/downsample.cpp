@@ -76,7 +76,7 @@ class CellTable {
   VoxelKey key_of(std::size_t cell) const { return keys_[cell]; }
 
  private:
-  static constexpr std::uint32_t empty = VoxelIndex::none;
+  static constexpr std::uint32_t empty = no_index;
   std::size_t home(VoxelKey key) const { return (key * 0x9E3779B97F4A7C15ULL) >> 32 & mask_; }
   // By value: an address would keep the point in memory for all the others.
   [[gnu::noinline]] Cell& begin_cell(std::size_t slot, VoxelKey key, Float4 p) {

@@ -34,7 +34,7 @@ struct LidarConfig {
         Field{"least_ratio", &LidarConfig::least_ratio, "-",
               "a scan that is flatter (smallest eigenvalue of the points' scatter over the largest) is not used, and the "
               "modality changes as if it were lost; 0: never"},
-        Field{"recut", &LidarConfig::recut, "-", "scans are cut anew so that each ends at an image; false: they are taken as they come"},
+        Field{"recut", &LidarConfig::recut, "-", "scans are recombined so that each ends at an image; false: they are used as they come"},
         Field{"mount_error", &LidarConfig::mount_error, "-",
               "reported sigmas allow for a LiDAR that is not mounted quite as described; false: the mount is known exactly"}};
   }

@@ -19,12 +19,12 @@
 
 namespace kilvo {
 
-/// A velocity known to this gives a sweep its shape, and tells a standing foot from a moving one, m/s.
+/// A velocity known to this gives a sweep its shape, and separates a stance foot from a moving one, m/s.
 inline constexpr double known_velocity = 0.15;
 
 /// What a sweep says.
 struct Registration {
-  std::optional<Reason> refused;  // it says nothing of the state
+  std::optional<Reason> refused;  // the state is not changed
   bool searched = false;          // the prior was too uncertain for the nearest planes to be the right ones
   Estimate posterior;             // of the prior's time
   /// It holds at least three directions and so carries the estimate. If not, the posterior is the prior.
@@ -80,7 +80,7 @@ class LidarPipeline {
   /// sweeps have agreed with the prediction some times, or where it has not been before. `map_error`: of the map around the prior.
   bool may_learn(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
   /// A sweep until `t` was refused. True when that has lasted for so long that the robot must be outside of the map, and the map is to
-  /// begin anew; never when it `is_given`.
+  /// restart; never when it `is_given`.
   bool refuse(Time t, bool map_is_given);
   /// The pose is not known any more: some consistent sweeps must come before the map grows again.
   void rejoin() { sweeps_to_go_ = consistent_sweeps; }

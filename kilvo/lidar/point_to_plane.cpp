@@ -48,7 +48,7 @@ LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> cluste
       workers_(workers),
       places_(clusters.size()),
       associations_(clusters.size()),
-      plane_of_node_(map.node_capacity(), VoxelIndex::none) {
+      plane_of_node_(map.node_capacity(), no_index) {
   rows_of_plane_.reserve(clusters.size());
 }
 
@@ -131,7 +131,7 @@ void LidarModel::count_rows_of_planes() {
   for (Association& a : associations_) {
     if (a.plane == nullptr) continue;
     std::uint32_t& place = plane_of_node_[a.node];
-    if (place == VoxelIndex::none) {
+    if (place == no_index) {
       place = static_cast<std::uint32_t>(rows_of_plane_.size());
       rows_of_plane_.push_back(0);
     }
@@ -139,7 +139,7 @@ void LidarModel::count_rows_of_planes() {
     ++rows_of_plane_[place];
   }
   for (const Association& a : associations_) {
-    if (a.plane != nullptr) plane_of_node_[a.node] = VoxelIndex::none;
+    if (a.plane != nullptr) plane_of_node_[a.node] = no_index;
   }
 }
 

@@ -9,7 +9,7 @@ namespace {
 
 // A plane that is fitted to fewer points than these takes most of their scatter.
 constexpr float fewest_points = 8;
-// Clusters of a sweep that are looked at; fewer than the second say nothing.
+// Clusters of a sweep that are used; with fewer than the second there is no estimate.
 constexpr std::ptrdiff_t most_clusters = 64;
 constexpr std::size_t fewest_clusters = 30;
 // Beams that graze a surface show the noise of their angle.

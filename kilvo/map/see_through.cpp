@@ -40,7 +40,8 @@ void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const Eige
   ++sweep_;
   if (ends.empty()) return;
   const std::size_t count = ends.size(), stride = std::max<std::size_t>(1, count / most_beams);
-  const std::size_t first = 7919 * static_cast<std::size_t>(sweep_) % count;  // anywhere: where the way does not do, each has its turn
+  const std::size_t first =
+      7919 * static_cast<std::size_t>(sweep_) % count;  // a different one each time: with too long beams each has its turn
   double left = most_way;
   const auto follow = [&](const Eigen::Vector3d& to) {
     trace(origin_W, to);
@@ -70,12 +71,12 @@ void VoxelMap::trace(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   if (!(length < config_.radius) || length < 2 * clear) return;
   const Eigen::Vector3d direction = (to - from) / length, inverse_direction = direction.cwiseInverse();
   constexpr double beyond = 1e-6;  // m: on the other side of a face
-  std::uint32_t last = none;
+  std::uint32_t last = no_index;
   for (double way = clear; way < length - clear;) {
     const Eigen::Vector3d x = from + way * direction;
     const Leaf leaf = leaf_of(x);
     const std::uint32_t root = roots_.find(root_key(leaf));
-    const bool empty = root == none || (nodes_[root].is_plane && !passes(nodes_[root].plane, from, to, clear));
+    const bool empty = root == no_index || (nodes_[root].is_plane && !passes(nodes_[root].plane, from, to, clear));
     if (!empty && is_passed(root, leaf, from, to, last)) return;
     const Leaf in_grid = empty ? Leaf{leaf[0] >> depth, leaf[1] >> depth, leaf[2] >> depth} : leaf;
     way += beyond + way_out(x, inverse_direction, in_grid, empty ? config_.voxel_size : clear);
@@ -90,9 +91,9 @@ bool VoxelMap::is_passed(std::uint32_t root, const Leaf& leaf, const Eigen::Vect
   // Only where points were: a plane need not fill its voxel.
   for (; level < depth; ++level) {
     const Node& node = nodes_[path[static_cast<std::size_t>(level)]];
-    if (node.children == none) return false;
+    if (node.children == no_index) return false;
     const std::uint32_t child = children_[node.children][octant(leaf, level)];
-    if (child == none) return false;
+    if (child == no_index) return false;
     path[static_cast<std::size_t>(level) + 1] = child;
     if (plane < 0 && nodes_[child].is_plane) plane = level + 1;
   }
@@ -122,7 +123,7 @@ void VoxelMap::forget_plane(const Path& path, int level, const Eigen::Vector3d& 
     Node& node = nodes_[path[static_cast<std::size_t>(above)]];
     node.moments = Moments();
     for (const std::uint32_t child : children_[node.children]) {
-      if (child != none) node.moments += nodes_[child].moments;
+      if (child != no_index) node.moments += nodes_[child].moments;
     }
     node.fitted_count = 0;
     refit_if_due(node, origin);

@@ -7,7 +7,7 @@ namespace {
 
 // A point that so many images in a row disagree with is no point of a surface, or has changed.
 constexpr std::uint16_t most_failures = 5;
-// How fast the agreement of an observation follows what images say.
+// How fast the agreement of an observation follows the images.
 constexpr float agreement_share = 0.2F;
 
 template <class T>
@@ -49,7 +49,7 @@ bool VisualMap::insert(const VisualPoint& point, const Observation& first) {
   p.observations[0] = place(observations_, free_observations_, first);
   ++frames_[first.frame].observations;
   p.next = voxels_.find(key);
-  if (p.next != VoxelIndex::none) voxels_.erase(key);
+  if (p.next != no_index) voxels_.erase(key);
   voxels_.insert(key, i);
   ++size_;
   return true;
@@ -101,7 +101,7 @@ void VisualMap::unlink(std::uint32_t point) {
   const std::uint32_t head = voxels_.find(key);
   if (head == point) {
     voxels_.erase(key);
-    if (points_[point].next != VoxelIndex::none) voxels_.insert(key, points_[point].next);
+    if (points_[point].next != no_index) voxels_.insert(key, points_[point].next);
     return;
   }
   std::uint32_t i = head;

@@ -54,7 +54,7 @@ struct VisualPoint {
   std::uint16_t failed = 0;  // images that did not, since the last that did
   std::uint8_t count = 0;    // observations
   std::array<std::uint32_t, most_observations> observations{};
-  std::uint32_t next = VoxelIndex::none;  // in its voxel
+  std::uint32_t next = no_index;  // in its voxel
   bool used = false;
 };
 
@@ -73,6 +73,7 @@ struct VisualMapConfig {
 class VisualMap {
  public:
   explicit VisualMap(const VisualMapConfig& config) : config_(config) {}
+  void clear() { *this = VisualMap(config_); }
 
   VoxelKey key_of(const Eigen::Vector3d& x) const {
     const double s = 1.0 / config_.voxel_size;
@@ -82,7 +83,7 @@ class VisualMap {
   /// Calls f(id, point) for each point of a voxel.
   template <class F>
   void visit(VoxelKey voxel, F&& f) const {
-    for (std::uint32_t i = voxels_.find(voxel); i != VoxelIndex::none; i = points_[i].next) f(i, points_[i]);
+    for (std::uint32_t i = voxels_.find(voxel); i != no_index; i = points_[i].next) f(i, points_[i]);
   }
 
   const VisualPoint& point(std::uint32_t id) const { return points_[id]; }
@@ -101,7 +102,7 @@ class VisualMap {
   void observe(std::uint32_t point, const Observation& view);
   /// The surface is known better now. A point that leaves its voxel stays listed there.
   void refresh(std::uint32_t point, const Eigen::Vector3d& p_W, const Eigen::Vector3f& normal_W, float variance, std::uint32_t node);
-  /// What an image said about a point through one of its observations; a point that images keep disagreeing with is removed.
+  /// The result of comparing an image with one observation of a point; a point that images keep disagreeing with is removed.
   void judge(std::uint32_t point, std::uint32_t observation, bool agreed, float correlation);
   /// Forgets points beyond `radius`, and the farthest ones while there are more than max_points.
   void forget(const Eigen::Vector3d& centre, double radius);

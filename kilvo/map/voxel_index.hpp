@@ -29,10 +29,11 @@ inline std::int64_t fast_floor(double x) {
   return i - (x < static_cast<double>(i) ? 1 : 0);
 }
 
+/// Of no element.
+inline constexpr std::uint32_t no_index = 0xffffffff;
+
 class VoxelIndex {
  public:
-  static constexpr std::uint32_t none = 0xffffffff;
-
   VoxelIndex() { resize(64); }
 
   std::size_t size() const { return size_; }
@@ -40,7 +41,7 @@ class VoxelIndex {
 
   std::uint32_t find(VoxelKey key) const {
     for (std::size_t i = home(key);; i = (i + 1) & mask_) {
-      if (slots_[i].value == none) return none;
+      if (slots_[i].value == no_index) return no_index;
       if (slots_[i].key == key) return slots_[i].value;
     }
   }
@@ -57,30 +58,30 @@ class VoxelIndex {
 
   void erase(VoxelKey key) {
     std::size_t i = home(key);
-    while (slots_[i].value != none && slots_[i].key != key) i = (i + 1) & mask_;
-    if (slots_[i].value == none) return;
+    while (slots_[i].value != no_index && slots_[i].key != key) i = (i + 1) & mask_;
+    if (slots_[i].value == no_index) return;
     --size_;
     // Shift back every later member of the run whose home is not between the hole and itself.
-    for (std::size_t j = (i + 1) & mask_; slots_[j].value != none; j = (j + 1) & mask_) {
+    for (std::size_t j = (i + 1) & mask_; slots_[j].value != no_index; j = (j + 1) & mask_) {
       if (((j - home(slots_[j].key)) & mask_) >= ((j - i) & mask_)) {
         slots_[i] = slots_[j];
         i = j;
       }
     }
-    slots_[i].value = none;
+    slots_[i].value = no_index;
   }
 
  private:
   struct Slot {
     VoxelKey key = 0;
-    std::uint32_t value = none;
+    std::uint32_t value = no_index;
   };
 
   std::size_t home(VoxelKey key) const { return (key * 0x9E3779B97F4A7C15ULL) >> shift_; }
 
   void place(VoxelKey key, std::uint32_t value) {
     std::size_t i = home(key);
-    while (slots_[i].value != none) i = (i + 1) & mask_;
+    while (slots_[i].value != no_index) i = (i + 1) & mask_;
     slots_[i] = {key, value};
   }
 
@@ -91,7 +92,7 @@ class VoxelIndex {
     shift_ = 64;
     for (std::size_t c = capacity; c > 1; c >>= 1) --shift_;
     for (const Slot& s : old) {
-      if (s.value != none) place(s.key, s.value);
+      if (s.value != no_index) place(s.key, s.value);
     }
   }
 

@@ -17,7 +17,7 @@ TEST(VoxelIndex, AgreesWithAnUnorderedMapOverAMillionRandomActions) {
   for (std::uint32_t i = 0; i < 1'000'000; ++i) {
     const VoxelKey key = pack_key(coordinate(), coordinate(), coordinate());
     const auto found = oracle.find(key);
-    ASSERT_EQ(index.find(key), found == oracle.end() ? VoxelIndex::none : found->second);
+    ASSERT_EQ(index.find(key), found == oracle.end() ? no_index : found->second);
     // Phases of growth and of decline.
     const bool grow = random() % 10 < (i / 100'000 % 2 == 0 ? 8U : 2U);
     if (grow && found == oracle.end()) {

@@ -53,23 +53,23 @@ template <std::size_t first_line, class Stop>
   for (const Leaf& leaf : leaves) roots_.prefetch(root_key(leaf));
   for (std::size_t i = 0; i < leaves.size(); ++i) {
     at[i] = roots_.find(root_key(leaves[i]));
-    if (at[i] != none) prefetch_node(at[i]);
+    if (at[i] != no_index) prefetch_node(at[i]);
   }
   for (int level = 0;; ++level) {
     for (std::size_t i = 0; i < leaves.size(); ++i) {
-      if (at[i] == none) continue;
+      if (at[i] == no_index) continue;
       const std::uint32_t table = nodes_[at[i]].children;
-      if (stop(i, at[i]) || table == none) {
-        at[i] = none;
+      if (stop(i, at[i]) || table == no_index) {
+        at[i] = no_index;
       } else {
         __builtin_prefetch(&children_[table]);
       }
     }
     if (level == depth) return;
     for (std::size_t i = 0; i < leaves.size(); ++i) {
-      if (at[i] == none) continue;
+      if (at[i] == no_index) continue;
       at[i] = children_[nodes_[at[i]].children][octant(leaves[i], level)];
-      if (at[i] != none) prefetch_node(at[i]);
+      if (at[i] != no_index) prefetch_node(at[i]);
     }
   }
 }
@@ -108,7 +108,7 @@ void VoxelMap::refit_if_due(Node& node, const Eigen::Vector3d& origin) {
 }
 
 void VoxelMap::insert(std::span<const PointGroup> groups, std::uint32_t epoch) {
-  constexpr double farthest = 1e5;  // m; what is beyond is no place a robot walks to, and would leave the key's bits
+  const double farthest = leaf_size() * static_cast<double>(std::int64_t{1} << (key_bits - 1));  // m: beyond it the key has no bits
   const auto usable = [&](const PointGroup& g) { return g.count > 0 && (g.mean.array().abs() < farthest).all(); };
   std::array<const PointGroup*, together> next;
   std::array<std::uint32_t, together> roots;
@@ -121,9 +121,9 @@ void VoxelMap::insert(std::span<const PointGroup> groups, std::uint32_t epoch) {
       next[count++] = &g;
     }
     // Of this walk only the root is kept; the rest is there to have the nodes at hand.
-    std::fill_n(roots.begin(), count, none);
+    std::fill_n(roots.begin(), count, no_index);
     walk_in_step<1>({leaves.data(), count}, [&](std::size_t i, std::uint32_t index) {
-      if (roots[i] == none) roots[i] = index;
+      if (roots[i] == no_index) roots[i] = index;
       return is_settled(nodes_[index]);
     });
     for (std::size_t i = 0; i < count; ++i) insert_one(*next[i], leaves[i], roots[i], epoch);
@@ -140,8 +140,8 @@ void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32
   };
   const VoxelKey key = root_key(leaf);
   // A root that was not there before may have come with the group before this one.
-  std::uint32_t index = root == none ? roots_.find(key) : root;
-  if (index == none) {
+  std::uint32_t index = root == no_index ? roots_.find(key) : root;
+  if (index == no_index) {
     index = new_node();
     roots_.insert(key, index);
     keys_.push_back(key);
@@ -161,24 +161,24 @@ void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32
     }
     if (level == depth) return;
     above_is_plane = above_is_plane || (node.is_plane && !settled);
-    if (node.children == none) {
+    if (node.children == no_index) {
       const std::uint32_t table = children_.take();
-      children_[table].fill(none);
+      children_[table].fill(no_index);
       node.children = table;
     }
     std::uint32_t& child = children_[node.children][octant(leaf, level)];
-    if (child == none) child = new_node();
+    if (child == no_index) child = new_node();
     index = child;
   }
 }
 
 void VoxelMap::free_children(Node& node) {
-  if (node.children == none) return;
+  if (node.children == no_index) return;
   for (const std::uint32_t child : children_[node.children]) {
-    if (child != none) free_tree(child);
+    if (child != no_index) free_tree(child);
   }
   children_.free.push_back(node.children);
-  node.children = none;
+  node.children = no_index;
 }
 
 void VoxelMap::free_tree(std::uint32_t index) {

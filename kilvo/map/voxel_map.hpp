@@ -61,7 +61,7 @@ class VoxelMap {
   /// begin now are marked with `epoch`: the caller's name for the pose error that they share.
   void insert(std::span<const PointGroup> groups, std::uint32_t epoch);
 
-  /// The beams from `origin_W` to these `ends` (to some of them, others each time) met nothing on their way: a plane that beams
+  /// The beams from `origin_W` to these `ends` (to some of them, others each time) met nothing before: a plane that beams
   /// keep passing through, and that no group is found on meanwhile, is not there any more and is forgotten with its points.
   void see_through(const Eigen::Vector3d& origin_W, std::span<const Eigen::Vector3d> ends);
 
@@ -81,7 +81,6 @@ class VoxelMap {
   std::size_t memory_bytes() const;
 
  private:
-  static constexpr std::uint32_t none = VoxelIndex::none;
   static constexpr std::size_t block_size = 1024;
   static constexpr int depth = 2;
 
@@ -91,9 +90,9 @@ class VoxelMap {
     bool is_plane = false;
     std::uint8_t against = 0;  // sweeps with beams that passed through the plane, since points were found on it
     std::uint32_t epoch = 0;
-    std::uint32_t children = none;  // index of its table of eight; none for leaves and undivided nodes
-    std::uint32_t passed_in = 0;    // the last of those sweeps
-    double fitted_count = 0;        // points at the last fit
+    std::uint32_t children = no_index;  // index of its table of eight; none for leaves and undivided nodes
+    std::uint32_t passed_in = 0;        // the last of those sweeps
+    double fitted_count = 0;            // points at the last fit
     Moments moments;
   };
   static_assert(sizeof(Plane) == 64 && sizeof(Node) == 192);
@@ -115,7 +114,7 @@ class VoxelMap {
     }
   };
 
-  // The leaf cell of a point, in integer coordinates: its upper bits are the root voxel, the lower ones the way down.
+  // The leaf cell of a point, in integer coordinates: its upper bits are the root voxel, the lower ones the path through the octree.
   using Leaf = std::array<std::int64_t, 3>;
   Leaf leaf_of(const Eigen::Vector3d& x) const {
     return {fast_floor(x.x() * leaves_per_metre_), fast_floor(x.y() * leaves_per_metre_), fast_floor(x.z() * leaves_per_metre_)};
@@ -159,10 +158,10 @@ template <class F>
 bool VoxelMap::visit_planes(const Eigen::Vector3d& x, F&& f) const {
   const Leaf leaf = leaf_of(x);
   std::uint32_t index = roots_.find(root_key(leaf));
-  for (int level = 0; index != none; ++level) {
+  for (int level = 0; index != no_index; ++level) {
     const Node& node = nodes_[index];
     if (node.is_plane && f(Match{&node.plane, index, node.epoch})) return true;
-    if (node.children == none) return false;
+    if (node.children == no_index) return false;
     index = children_[node.children][octant(leaf, level)];
   }
   return false;

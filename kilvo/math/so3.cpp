@@ -41,7 +41,7 @@ SO3 SO3::Exp(const Eigen::Vector3d& theta) {
 }
 
 Eigen::Vector3d SO3::Log() const {
-  // The quaternion has no loss of precision near pi, where the matrix's trace has; its sign picks the short way round.
+  // The quaternion has no loss of precision near pi, where the matrix's trace has; its sign selects the shorter rotation.
   Eigen::Quaterniond q = Eigen::Quaterniond(R_).normalized();
   if (q.w() < 0) q.coeffs() *= -1.0;
   const double n2 = q.vec().squaredNorm();

@@ -6,6 +6,9 @@
 
 namespace kilvo {
 
+/// A grey level, or one of a colour, that may be saturated: the true one is unknown.
+inline constexpr int overexposed = 250;
+
 struct Image {
   int width = 0;                     // pixels
   int height = 0;                    // pixels

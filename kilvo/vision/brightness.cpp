@@ -17,7 +17,7 @@ double Brightness::doubt(double other) const {
 }
 
 Brightness brightness_of(std::vector<double> logs) {
-  constexpr double of_normal = 1.48, finest = 0.002;  // standard deviation by median deviation; what grey levels can tell
+  constexpr double of_normal = 1.48, finest = 0.002;  // standard deviation by median deviation; resolution of grey levels
   constexpr int iterations = 8;
   Brightness out{median_of(logs), finest};
   std::vector<double> off(logs.size());

@@ -1,4 +1,4 @@
-// What many patches say together of how bright an image is.
+// The brightness of an image as a consensus of many patches.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@ namespace kilvo {
 /// The upper one of two in the middle. Of at least one value.
 double median_of(std::vector<double> values);
 
-/// Logarithms of brightness ratios, most of which differ by little; the others show something else, and how far off they are says nothing.
+/// Logarithms of brightness ratios, most of which differ by little; the others show something else, at any distance.
 /// The maximum of their likelihood with tails of inverse squares: a median follows when a third of them lie on one side, and those along
 /// the way a robot goes do.
 struct Brightness {
@@ -16,7 +16,7 @@ struct Brightness {
   double spread = 0;  // of one patch
   double sigma = 0;   // of log
 
-  /// How much less one that says `other` is worth than one that agrees: a factor of its variance.
+  /// Factor on the variance of a ratio `other` against one that agrees.
   double doubt(double other) const;
 };
 

@@ -12,7 +12,7 @@ namespace kilvo {
 
 class Camera {
  public:
-  /// Throws std::invalid_argument when the mount's model or its numbers make no sense.
+  /// Throws std::invalid_argument when the mount's model or its numbers are invalid.
   explicit Camera(const CameraMount& mount);
 
   int width() const { return width_; }

@@ -5,8 +5,7 @@
 namespace kilvo {
 namespace {
 
-constexpr double nearest = 0.5;   // m; closer is no better
-constexpr int overexposed = 250;  // of a channel: how bright it really was, nobody knows
+constexpr double nearest = 0.5;  // m; closer is no better
 constexpr float of_overexposed = 0.02F;
 
 // By grey value.

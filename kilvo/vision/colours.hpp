@@ -13,7 +13,7 @@
 
 namespace kilvo {
 
-/// What an image says about the colour of a point of the map.
+/// The colour of a point of the map in an image.
 struct ColouredPoint {
   Eigen::Vector3f p_W;              // m
   std::array<std::uint8_t, 3> rgb;  // as the first image, with its exposure, would have shown it

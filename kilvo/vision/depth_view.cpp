@@ -22,7 +22,7 @@ DepthView::DepthView(const Camera& camera, const SE3& T_CW, std::span<const Eige
     : points_W_(points_W),
       columns_(camera.width() / cell + 1),
       rows_(camera.height() / cell + 1),
-      nearest_(static_cast<std::size_t>(columns_ * rows_), none) {
+      nearest_(static_cast<std::size_t>(columns_ * rows_), no_index) {
   const Eigen::Matrix3f R = T_CW.R.matrix().cast<float>();
   const Eigen::Vector3f t = T_CW.p.cast<float>();
   for (std::uint32_t i = 0; i < points_W.size(); ++i) {
@@ -32,21 +32,20 @@ DepthView::DepthView(const Camera& camera, const SE3& T_CW, std::span<const Eige
     if (!pixel || !camera.sees(*pixel, 0)) continue;
     const auto at = static_cast<std::size_t>(static_cast<int>(pixel->y()) / cell * columns_ + static_cast<int>(pixel->x()) / cell);
     std::uint32_t& nearest = nearest_[at];
-    if (nearest == none || p_C.z() < seen_[nearest].depth) nearest = static_cast<std::uint32_t>(seen_.size());
+    if (nearest == no_index || p_C.z() < seen_[nearest].depth) nearest = static_cast<std::uint32_t>(seen_.size());
     seen_.push_back({i, pixel->cast<float>(), p_C.z()});
   }
   find_fronts();
 }
 
 void DepthView::find_fronts() {
-  constexpr float nothing = std::numeric_limits<float>::infinity();
   const auto columns = static_cast<std::size_t>(columns_), rows = static_cast<std::size_t>(rows_);
   const std::size_t wide = columns + 2;  // with a border
-  std::vector<float> own(wide * (rows + 2), nothing), across(own);
+  std::vector<float> own(wide * (rows + 2), std::numeric_limits<float>::infinity()), across(own);
   for (std::size_t y = 0; y < rows; ++y) {
     for (std::size_t x = 0; x < columns; ++x) {
       const std::uint32_t nearest = nearest_[y * columns + x];
-      if (nearest != none) own[(y + 1) * wide + x + 1] = seen_[nearest].depth;
+      if (nearest != no_index) own[(y + 1) * wide + x + 1] = seen_[nearest].depth;
     }
   }
   for (std::size_t i = 1; i + 1 < own.size(); ++i) across[i] = std::min(own[i], std::min(own[i - 1], own[i + 1]));
@@ -64,7 +63,7 @@ bool DepthView::hides(const Eigen::Vector2d& pixel, const Eigen::Vector3d& p_W, 
   for (int j = std::max(0, y - 1); j <= std::min(rows_ - 1, y + 1); ++j) {
     for (int i = std::max(0, x - 1); i <= std::min(columns_ - 1, x + 1); ++i) {
       const std::uint32_t nearest = nearest_[static_cast<std::size_t>(j * columns_ + i)];
-      if (nearest == none || static_cast<double>(seen_[nearest].depth) >= depth) continue;
+      if (nearest == no_index || static_cast<double>(seen_[nearest].depth) >= depth) continue;
       if (n_W.dot(point(seen_[nearest]) - p_W) > limit) return true;
     }
   }

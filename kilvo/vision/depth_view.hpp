@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "kilvo/map/voxel_index.hpp"
 #include "kilvo/math/se3.hpp"
 #include "kilvo/vision/camera.hpp"
 
@@ -34,7 +35,6 @@ class DepthView {
 
  private:
   static constexpr int cell = 8;  // px
-  static constexpr std::uint32_t none = 0xffffffff;
   void find_fronts();
   float front(const Eigen::Vector2f& pixel) const {
     return fronts_[static_cast<std::size_t>(static_cast<int>(pixel.y()) / cell * columns_ + static_cast<int>(pixel.x()) / cell)];

@@ -19,7 +19,6 @@ std::pair<Values, double> PhotometricModel::as_first_seen(std::size_t i, const S
 }
 
 std::optional<Brightness> PhotometricModel::exposure_at(const State& x) const {
-  constexpr double border = 10;  // pixels a patch needs around it at its level
   struct Compared {
     double log;
     float top;   // of the patch
@@ -31,13 +30,13 @@ std::optional<Brightness> PhotometricModel::exposure_at(const State& x) const {
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     const Prepared& p = prepared_[i];
     const auto view = begins_at(x) ? p.first_view : view_of(camera_, at_.T_CI, x.pose(), p.p_W);
-    if (!p.patch || !view || !camera_.sees(view->pixel, border * (1 << level_))) continue;
+    if (!p.patch || !view || !camera_.sees(view->pixel, selected_border * (1 << level_))) continue;
     Values seen;
     sample_patch(pyramid_[static_cast<std::size_t>(level_)], at_level(view->pixel, level_).cast<float>(), seen);
     const auto [patch, tau] = as_first_seen(i, T_CW);
     const float here = mean_of(seen), there = mean_of(patch);
-    constexpr float dark = 8, light = 250;
-    if (here < dark || there < dark || here > light || there > light) continue;
+    constexpr float dark = 8;
+    if (here < dark || there < dark || here > overexposed || there > overexposed) continue;
     compared.push_back({std::log(tau * static_cast<double>(there / here)), top_of(patch), tau, p.plain});
   }
   // A plain surface is known to be the same only by where it is, and of one that is too bright in part the rest is what is dark.

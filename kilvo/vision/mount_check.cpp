@@ -14,8 +14,8 @@ constexpr int enough_views = 200;
 // A careful calibration reaches a tenth of this. What is found is less than what there is: patches that are far off are not found at all.
 constexpr double worth_saying = 0.005;                       // rad
 constexpr double sure = 6;                                   // standard deviations
-constexpr double best_view = 2e-4;                           // rad; no view says more than this, however many patches it has
-constexpr double alike = 0.01;                               // rad; views that are turned by less say nothing,
+constexpr double best_view = 2e-4;                           // rad; smallest sigma of a view, for any number of patches
+constexpr double alike = 0.01;                               // rad; views rotated by less give no information,
 constexpr double alike_rate = 0.05;                          // rad/s; unless the robot turned at another rate
 constexpr double repeated = 20;                              // views of the same seconds repeat each other
 constexpr double likely_mount = 0.02, likely_offset = 0.02;  // rad, s

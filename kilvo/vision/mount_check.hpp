@@ -1,7 +1,7 @@
 // Whether the camera is mounted as configured. If it is turned by psi (IMU frame), a view from R_r puts the points of a map so that, seen
-// from R_c, the camera seems to be turned by (R_c' R_r - I) psi against where the LiDAR has it: nothing while the robot looks the same way,
-// the more the more it turns. If its stamps are tau too small, it seems to be turned by (omega_c - R_c' R_r omega_r) tau besides. So psi
-// and tau are a least-squares problem over all images, and small turns suffice.
+// from R_c, the camera seems to be turned by (R_c' R_r - I) psi against where the LiDAR has it: nothing while the robot keeps its
+// orientation, the more the more it turns. If its stamps are tau too small, it seems to be turned by (omega_c - R_c' R_r omega_r) tau
+// besides. So psi and tau are a least-squares problem over all images, and small turns suffice.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +17,7 @@ class MountCheck {
     SO3 R_WI;
     Eigen::Vector3d omega;  // of the body, in its frame, rad/s
   };
-  /// An image, held against earlier views, says that the body is turned by d: information A on d (3x3, rad^-2), and b = A d.
+  /// An image, compared with earlier views, measures a rotation of the body by d: information A on d (3x3, rad^-2), and b = A d.
   void add(const View& image, const View& earlier, const Eigen::Matrix3d& A, const Eigen::Vector3d& b);
 
   /// The turn of the camera in the IMU frame, rad, if the images so far are sure that there is one worth speaking of.

@@ -9,8 +9,6 @@
 namespace kilvo {
 namespace {
 
-// Pixels around a new point that its coarser patches need.
-constexpr double new_point_border = 20;
 // Surfaces seen at a flatter angle than this (its sine) are no use.
 constexpr double grazing_new = 0.2;
 
@@ -40,7 +38,8 @@ struct Search {
 
   // Equally bright all around, also when it is seen a little beside its place.
   bool is_even(const Eigen::Vector2d& pixel) const {
-    constexpr int reach = 8, most = 3;  // px, grey levels
+    constexpr int most = 3;  // grey levels
+    const int reach = Template::size;
     int low = 255, high = 0;
     for (const int dy : {-reach, 0}) {
       for (const int dx : {-reach, 0}) {

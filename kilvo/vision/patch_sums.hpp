@@ -1,4 +1,4 @@
-// What the pixels of one patch say together.
+// Sums over the pixels of one patch.
 #pragma once
 
 #include <Eigen/Core>

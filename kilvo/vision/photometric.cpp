@@ -111,8 +111,7 @@ PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x)
   out.expected_variance = pixel_variance(x.tau, brightness * p.tau / x.tau) + pixel_variance(p.tau, brightness);
   const double bias = config_.bias_share * p.tau * brightness + 1e-3;
   out.bias_variance = bias * bias;
-  constexpr float dark = 1;
-  out.brightness = std::log(p.tau * std::max(1.0, brightness) / static_cast<double>(std::max(dark, mean_of(seen))));
+  out.brightness = std::log(p.tau * std::max(1.0, brightness) / static_cast<double>(std::max(1.0F, mean_of(seen))));
   out.view = *view;
   out.sums = sums_of(*p.patch, seen, x.tau, p.tau);
   verdict.looked = !out.sums.saturated;
@@ -210,7 +209,7 @@ Information<7> PhotometricModel::operator()(const State& x, const Covariance& pr
     if (parts[i].sums.saturated) ++report_.saturated;
     if (!parts[i].valid && prepared_[i].patch && !prepared_[i].plain && !parts[i].sums.saturated) ++report_.unlike;
   }
-  // Noise of the pixels that nobody configured: of the whole image.
+  // Noise of the pixels beyond the settings, of the whole image.
   const double scale2 = ratios.empty() ? 1 : std::max(1.0, median_of(std::move(ratios)));
   report_.noise = std::sqrt(scale2);
   groups_.clear();
@@ -227,7 +226,7 @@ Information<7> PhotometricModel::operator()(const State& x, const Covariance& pr
   G.topLeftCorner<6, 6>() = from_origin(x.pose());
   for (Group& group : groups_) {
     const VisualFrame& frame = map_.frame(group.frame);
-    // The exposure of the frame scales what it says of this one's.
+    // The exposure of the frame scales its measurement of this one's.
     G(6, 6) = x.tau / frame.tau;
     add_common_noise<7>(G * frame.noise * G.transpose(), group.info);
     total.A += group.info.A;

@@ -1,6 +1,7 @@
 // The visual measurement (paper, Eq. 12): patches of the visual map against the image, directly by their grey values, with the inverse
-// exposure time as a state. The pixels of one patch are summed into what they say of its place in the image and of the exposure; only then
-// does the pose enter, so that what is uncertain about a patch as a whole (depth, calibration) is noise of the patch, not of each pixel.
+// exposure time as a state. The pixels of one patch are summed into a measurement of its position in the image and of the exposure; only
+// then does the pose enter, so that what is uncertain about a patch as a whole (depth, calibration) is noise of the patch, not of each
+// pixel.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,7 +43,7 @@ class PhotometricModel {
     int tracks = 0, used = 0, moved = 0, unlike = 0, saturated = 0;
     double noise = 1;  // of the pixels, times what was expected (standard deviation)
   };
-  /// Keeps references: the map, the camera, the pyramid and the tracks must outlive it. `prior`: of the pose before the image; it says how
+  /// Keeps references: the map, the camera, the pyramid and the tracks must outlive it. `prior`: of the pose before the image; it gives how
   /// coarsely to begin.
   PhotometricModel(const VisualMap& map, const Camera& camera, const SE3& T_CI, std::span<const GreyImage> pyramid,
                    std::span<const PatchCandidate> tracks, const Estimate& prior, const VisionConfig& config);
@@ -55,7 +56,7 @@ class PhotometricModel {
     double weight = 0;  // 1/m^2
   };
 
-  /// What one frame's patches say of a turn of the body, before any was refused for being found elsewhere than expected.
+  /// The rotation of the body measured by one frame's patches, before any was rejected for its position.
   struct Turn {
     std::uint32_t frame = 0;
     Eigen::Matrix3d A = Eigen::Matrix3d::Zero();

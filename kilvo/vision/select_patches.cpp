@@ -10,8 +10,6 @@
 namespace kilvo {
 namespace {
 
-// Pixels that a patch needs around it, at level 0.
-constexpr double selected_border = 10;
 // Surfaces seen at a flatter angle than this (its sine) are no use.
 constexpr double grazing = 0.12;
 // Views that differ by more show another picture, rad.
@@ -70,7 +68,7 @@ bool choose_observation(const View& view, const VisualPoint& p, PatchCandidate& 
   return warp.has_value();
 }
 
-// A point that the image should show, and what it promises.
+// A point that the image should show, with its expected value.
 struct Candidate {
   std::size_t cell;
   double worth, depth;
@@ -108,7 +106,7 @@ std::optional<PlaneWarp> warp_between(const Camera& camera, const SE3& T_CW, con
   out.A = there->J * T_RW.R.matrix() * along * B.inverse();
   // How deep the plane lies in the other view, over how deep in this one, by the pixel of this one.
   const Eigen::Vector3d p_C = T_CW * p_W, p_R = T_RW * p_W;
-  constexpr double flat = 0.1;  // of a wide lens: beyond it depth says little
+  constexpr double flat = 0.1;  // of a wide lens: beyond it depth has little effect
   if (p_C.z() < flat * p_C.norm() || p_R.z() < flat * p_R.norm()) return out;
   const SE3 T_RC = T_RW * T_CW.inverse();
   const Eigen::Vector3d n_C = T_CW.R * n_W;

@@ -19,7 +19,7 @@ struct PatchCandidate {
   std::uint32_t observation = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // where it is expected
   PlaneWarp warp;                                   // from this image to the observation's
-  bool plain = false;                               // without corners: how bright it is says what the exposure is, no more
+  bool plain = false;                               // without corners: its brightness measures the exposure only
   double view_angle = 0;                            // between the two views of the point, rad
 };
 
@@ -37,7 +37,9 @@ class CellGrid {
   int cell_, columns_, rows_;
 };
 
-/// So many tell the exposure by themselves.
+/// Pixels that a patch needs around it, at its level.
+inline constexpr double selected_border = 10;
+/// So many corners determine the exposure alone.
 inline constexpr std::size_t enough_corners = 8;
 /// With more of them plain patches are neither begun nor looked at.
 inline constexpr std::size_t plenty_of_corners = 24;

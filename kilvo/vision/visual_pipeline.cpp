@@ -31,8 +31,9 @@ bool is_new_view(const PatchCandidate& track) {
   return octaves > new_scale || track.view_angle > new_angle;
 }
 
-// What an image says of the pose goes into what it leaves behind only where the LiDAR is blind. Elsewhere its patches are kept where the
-// LiDAR's map has them: else two maps would come to be, each true to itself, whose rays and planes no longer meet where the surface is.
+// The visual correction of the pose is applied to new patches only along directions that the LiDAR does not measure. Elsewhere patches are
+// kept where the LiDAR's map has them: else two maps would come to be, each true to itself, whose rays and planes no longer meet where the
+// surface is.
 SE3 as_the_map_has_it(const State& before, const State& after, const PoseCovariance& weak) {
   const Eigen::Matrix<double, 6, 1> change = weak * boxminus(after, before).head<6>();
   return {before.R * SO3::Exp(change.head<3>()), before.p + change.tail<3>()};
@@ -69,7 +70,6 @@ VisualPipeline::VisualPipeline(const CameraMount& mount, const VisionConfig& con
                                double map_radius)
     : mount_(mount),
       config_(config),
-      map_config_(map),
       update_(update),
       map_radius_(map_radius),
       camera_(mount),
@@ -94,7 +94,7 @@ std::optional<VisualPipeline::Fault> VisualPipeline::fault_of(const CameraImage&
 }
 
 std::optional<Reason> VisualPipeline::refuses(Time image) const {
-  if (image < doubted_until_) return Reason::mount_doubted;
+  if (image < mount_watch_.refused_until) return Reason::mount_doubted;
   if (image < begins_at_) return Reason::before_motion;
   if (seen_W_.empty()) return Reason::before_sweep;
   return std::nullopt;
@@ -137,7 +137,7 @@ VisualRegistration VisualPipeline::measure(const CameraImage& image, const Image
   return out;
 }
 
-// Lamps are switched and exposures jump: what it was says nothing, the image all.
+// Lamps are switched and exposures jump: the exposure comes from the image alone, not from the prior.
 void VisualPipeline::adapt_exposure(Work& work) const {
   Estimate& prior = work.prior;
   const auto exposure = config_.adapt_exposure ? work.model.exposure_at(prior.x) : std::nullopt;
@@ -169,8 +169,8 @@ Estimate VisualPipeline::update_by(Work& work) {
   return update(work.prior, measured, config).posterior;
 }
 
-// Patches are found within some pixels of where they are expected. Along what the LiDAR does not see the way is the images' own: it may be
-// uncertain, and new patches are begun there.
+// Patches are found within some pixels of where they are expected. Along what the LiDAR does not measure the position is from the images:
+// it may be uncertain, and new patches are begun there.
 bool VisualPipeline::is_lost_among_patches(const ImageContext& context) const {
   constexpr double reach = 8, depth = 3;  // px, m
   const PoseCovariance known = PoseCovariance::Identity() - context.unobservable;
@@ -189,10 +189,10 @@ bool VisualPipeline::says_nothing(const Work& work) {
   return nothing && in_vain_ <= patient;
 }
 
-// Standing feet measure the way along what no sweep knows by a few parts in ten thousand, images by a part in thousand, and what they are
-// wrong by is the same in image after image until other patches are seen: beside feet, images only catch what feet get grossly wrong.
+// Stance feet measure the distance along what no sweep measures to a few parts in ten thousand, images to a part in thousand, and their
+// error is the same in image after image until other patches are seen: beside feet, images only catch what feet get grossly wrong.
 PoseCovariance VisualPipeline::doubt_of_way(const Work& work, const SE3& T_WI) const {
-  constexpr double wrong_share = 0.3;  // of the way from the frames
+  constexpr double wrong_share = 0.3;  // of the distance from the frames
   double way = 0, weights = 0;
   for (const auto& [frame, weight] : work.model.by_frame()) {
     way += weight * (T_WI.p - position_of(map_.frame(frame))).norm();
@@ -217,18 +217,19 @@ std::vector<EarlierView> VisualPipeline::drift_of(const Work& work, const SE3& T
 Eigen::Vector3d VisualPipeline::position_of(const VisualFrame& frame) const { return (frame.T_CW.inverse() * T_CI_).p; }
 
 // The turn of the camera in the IMU frame, rad, if there is one worth speaking of. The camera is tried again later, each time later still:
-// what fooled the check may have passed.
+// the cause of a false alarm may have passed.
 std::optional<Eigen::Vector3d> VisualPipeline::check_mount(const Work& work) {
   for (const PhotometricModel::Turn& turn : work.model.turns()) {
     const VisualFrame& frame = map_.frame(turn.frame);
     const SO3 R_IW = T_CI_.R.inverse() * frame.T_CW.R;
-    mount_check_.add({work.prior.x.R, work.omega}, {R_IW.inverse(), frame.omega}, turn.A, turn.b);
+    mount_watch_.check.add({work.prior.x.R, work.omega}, {R_IW.inverse(), frame.omega}, turn.A, turn.b);
   }
-  const auto psi = mount_check_.misalignment();
+  const auto psi = mount_watch_.check.misalignment();
   if (!psi) return std::nullopt;
   constexpr Duration first_pause = std::chrono::seconds(10), longest_pause = std::chrono::minutes(5);
-  pause_ = pause_ == Duration(0) ? first_pause : std::min(longest_pause, 2 * pause_);
-  doubted_until_ = work.posterior.t + pause_;
+  Duration& pause = mount_watch_.pause;
+  pause = pause == Duration(0) ? first_pause : std::min(longest_pause, 2 * pause);
+  mount_watch_.refused_until = work.posterior.t + pause;
   restart_mount_check();
   return psi;
 }
@@ -265,7 +266,6 @@ std::vector<ColouredPoint> VisualPipeline::learn(const VoxelMap& map, const Pose
 void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const SE3& T_CW, std::uint32_t frame) {
   // A point is not denied by an image that agrees with few others either.
   const bool is_good = 2 * work.model.report().used > work.model.report().tracks;
-  constexpr double border = 20;  // px
   for (std::size_t i = 0; i < work.tracks.size(); ++i) {
     const PatchCandidate& track = work.tracks[i];
     const PhotometricModel::Verdict& verdict = work.model.verdicts()[i];
@@ -277,7 +277,7 @@ void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const S
     if (project_to_plane(map, -(first.R.inverse() * first.p), point))
       map_.refresh(track.point, point.p_W, point.normal_W, point.variance, point.node);
     const auto pixel = camera_.project(T_CW * point.p_W);
-    if (!config_.new_views || !is_new_view(track) || !pixel || !camera_.sees(*pixel, border)) continue;
+    if (!config_.new_views || !is_new_view(track) || !pixel || !camera_.sees(*pixel, new_point_border)) continue;
     const Eigen::Vector2f stored = pixel->cast<float>();
     if (const auto patch = cut_patch(work.pyramid, stored.cast<double>()))
       map_.observe(track.point, {.frame = frame, .pixel = stored, .patch = *patch});
@@ -285,15 +285,15 @@ void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const S
 }
 
 std::optional<double> VisualPipeline::clock_offset() {
-  const auto offset = mount_check_.time_offset(least_clock_offset);
+  const auto offset = mount_watch_.check.time_offset(least_clock_offset);
   if (!offset) return std::nullopt;
   restart_mount_check();
   forget_map();
   return offset;
 }
 
-void VisualPipeline::restart_mount_check() { mount_check_ = MountCheck(); }
+void VisualPipeline::restart_mount_check() { mount_watch_.check = MountCheck(); }
 
-void VisualPipeline::forget_map() { map_ = VisualMap(map_config_); }
+void VisualPipeline::forget_map() { map_.clear(); }
 
 }  // namespace kilvo

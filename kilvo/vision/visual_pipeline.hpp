@@ -1,5 +1,5 @@
 // One image, from the message to the estimate at its time: which patches of the visual map it should show, how the pose and the exposure
-// must be for that, whether that may be believed, and what is learnt from it. Owns the visual map; changes neither the LiDAR's map nor the
+// must be for that, whether that is valid, and what is learnt from it. Owns the visual map; changes neither the LiDAR's map nor the
 // estimate.
 #pragma once
 
@@ -31,10 +31,10 @@ struct ImageContext {
   SE3 T_image, T_prior;  // poses of the IMU at the image's and at the prior's time, in one frame, any; the same when the times are
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();        // at the image's time, as measured, rad/s
   PoseCovariance unobservable = PoseCovariance::Zero();  // takes a pose error to its part along what the last sweep did not know
-  bool feet_hold = false;                                // standing feet measure the way along that
+  bool feet_hold = false;                                // stance feet measure the distance along that
 };
 
-/// What an image says.
+/// The result of an image.
 struct VisualRegistration {
   std::optional<Reason> refused;
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();  // of mount_doubted: by how much the camera seems to be, about the IMU's axes, rad
@@ -42,7 +42,7 @@ struct VisualRegistration {
   SE3 T_WI;                                          // where the image's patches are kept, see VisualPipeline::learn
   int used = 0;                                      // patches that were found as they were
   bool carries = false;                              // so many that they carry the estimate
-  /// Along what no sweep knows the pose is wrong by what the frames are that it was held against, as learn() was told of them.
+  /// Along what no sweep measures the pose has the errors of the frames that it was compared with, as given to learn().
   std::vector<EarlierView> drift;
 };
 
@@ -67,7 +67,7 @@ class VisualPipeline {
   /// Why an image of this time is not looked at, if so.
   std::optional<Reason> refuses(Time image) const;
 
-  /// The points of a sweep (x, y, z, intensity; world, m): they tell what hides what.
+  /// The points of a sweep (x, y, z, intensity; world, m): they show the occlusions.
   void see(const std::vector<Eigen::Vector4f>& points_W) { seen_W_ = points_W; }
 
   /// Registers the image.
@@ -78,9 +78,9 @@ class VisualPipeline {
 
   /// s, to be added to the stamps of the images, if they are sure to be off. What was seen by the clock as it was is forgotten then.
   std::optional<double> clock_offset();
-  /// The LiDAR's clock may be off: what the images say of the mount may be that.
+  /// The LiDAR's clock may be off: the error of the mount seen by images may be that.
   void restart_mount_check();
-  /// The map begins anew.
+  /// The map restarts.
   void forget_map();
   const VisualMap& map() const { return map_; }
 
@@ -96,18 +96,23 @@ class VisualPipeline {
   void judge_points(const Work& work, const VoxelMap& map, const SE3& T_CW, std::uint32_t frame);
   Eigen::Vector3d position_of(const VisualFrame& frame) const;
 
+  // The check of the mount, and how long images are not used after a fault of it.
+  struct MountWatch {
+    MountCheck check;
+    Time refused_until{};
+    Duration pause{};  // after the last fault
+  };
+
   CameraMount mount_;
   VisionConfig config_;
-  VisualMapConfig map_config_;
   UpdateConfig update_;
   double map_radius_;  // m
   Camera camera_;
   SE3 T_CI_;
   VisualMap map_;
-  MountCheck mount_check_;
-  InnovationScale excess_;  // what images say too much: their calibration is wrong
-  Time begins_at_{}, doubted_until_{};
-  Duration pause_{};                                  // after the mount was doubted the last time
+  MountWatch mount_watch_;
+  InnovationScale excess_;  // excess of the images' innovations: errors of calibration
+  Time begins_at_{};
   int in_vain_ = 0;                                   // images in a row in which hardly any patch was found
   Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();  // of the last image, m
   std::vector<Eigen::Vector4f> seen_W_;

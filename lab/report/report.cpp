@@ -66,7 +66,7 @@ Json reasons_for_distrust(const RunFiles& run, const Way& way) {
   if (way.evaluation && judge_divergence(*way.evaluation).diverged)
     out.push_back("the error against the truth is larger than a drift could be");
   if (run.summary.contains("recovery") && run.summary["recovery"].is_object() && run.summary["recovery"].value("maps_begun_anew", 0) > 0)
-    out.push_back("the map was begun anew: poses before and after do not belong together");
+    out.push_back("the map was restarted: poses before and after are in different frames");
   return out;
 }
 

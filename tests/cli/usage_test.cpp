@@ -29,7 +29,7 @@ TEST(Usage, MistypedWordsNameTheNearest) {
 }
 
 TEST(Usage, MissingOrImpossibleWordsAreSaid) {
-  expect_error({}, 2, "say a verb");
+  expect_error({}, 2, "name a verb");
   expect_error({"run"}, 2, "INPUT");
   expect_error({"run", "x.bag"}, 2, "--out");
   expect_error({"config"}, 2, "subcommand");

@@ -57,7 +57,7 @@ TEST_F(WrongDescription, OfTheLidarIsMended) {
   EXPECT_EQ(f.code, 1);
   EXPECT_THAT(f.err,
               AllOf(HasSubstr("the LiDAR is turned against its description by"), HasSubstr("; the results are with lidar.T_imu_lidar.R"),
-                    HasSubstr("warning: begun anew with lidar.T_imu_lidar.R: [")));
+                    HasSubstr("warning: restarted with lidar.T_imu_lidar.R: [")));
   EXPECT_THAT(result("events.csv"), HasSubstr(",lidar,description_wrong,"));
   EXPECT_LT(error(), 0.0013);
 }

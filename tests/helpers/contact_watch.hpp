@@ -76,7 +76,7 @@ inline std::vector<Change> watch(ContactEstimator& estimator, const Scene& scene
 }
 
 inline std::vector<Change> watch(const Scene& scene, double to, double rate = 1000) {
-  ContactEstimator estimator{LegConfig{}};
+  ContactEstimator estimator;
   return watch(estimator, scene, 0, to, rate);
 }
 

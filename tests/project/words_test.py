@@ -22,6 +22,12 @@ class Words(unittest.TestCase):
     def test_finds_old_words_in_decisions(self):
         self.assertRegex(self.faults("docs/decisions/live.md", "The forerunner runs.\n")[0], r"^docs/decisions/live.md:1: `forerunner`")
 
+    def test_finds_private_words_in_documents_and_in_the_estimator(self):
+        self.assertRegex(self.faults("docs/outputs.md", "drift in % of the way\n")[0], r"^docs/outputs.md:1: `% of the way`")
+        self.assertEqual(len(self.faults("kilvo/legs/x.hpp", "// The map begins anew.\n// An image tells nothing.\n")), 2)
+        self.assertEqual(len(self.faults("README.md", "Each sense is mended.\n")), 2)
+        self.assertEqual(self.faults("kilvo/legs/x_test.cpp", "// The map begins anew.\n"), [])
+
     def test_leaves_the_glossary_and_real_rooms_alone(self):
         self.assertEqual(self.faults("docs/notation.md", "forerunner\n"), [])
         self.assertEqual(self.faults("README.md", "A room with a floor, walls and a door.\n"), [])
