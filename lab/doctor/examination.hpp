@@ -2,6 +2,7 @@
 // when it is wrong, so that a fault of one sense does not look like a fault of the next.
 #pragma once
 
+#include <cmath>
 #include <optional>
 
 #include "kilvo/sensors/robot.hpp"
@@ -13,12 +14,21 @@
 #include "lab/doctor/refinement.hpp"
 #include "lab/doctor/scan_odometry.hpp"
 #include "lab/doctor/stance_fit.hpp"
+#include "lab/doctor/stepping.hpp"
 #include "lab/doctor/translation_fit.hpp"
 #include "lab/doctor/turns.hpp"
 
 namespace kilvo::lab {
 
-inline constexpr double sure = 4;              // standard deviations
+inline constexpr double sure = 4;  // standard deviations
+/// Standard deviations beyond which the best of so many is as rarely by chance as a single one beyond `sure` (Bonferroni): the tail of a
+/// normal distribution falls as exp(-x^2 / 2).
+inline double sure_among(std::size_t hypotheses) { return std::sqrt(sure * sure + 2 * std::log(static_cast<double>(hypotheses) + 1)); }
+/// Standard deviations by which one of two shares that are not explained is smaller, each of so many independent values (F. J. Anscombe:
+/// the logarithm of a variance of n values has the variance 2 / n).
+inline double smaller_by(double share, double than, double independent) {
+  return independent > 0 && share > 0 && than > 0 ? std::log(than / share) * std::sqrt(independent) / 2 : 0;
+}
 inline constexpr double gravity = 9.80665;     // m/s^2
 inline constexpr double turn_interval = 0.04;  // s, of a turn of the legs
 inline constexpr double pose_period = 0.009;   // s, between poses of the legs
@@ -89,6 +99,8 @@ class Examination {
   void examine_lidar_position();
   // leg_examination.cpp
   void examine_legs();
+  /// Of the legs' turning: soles that roll do so alike within a step.
+  double independent_turns() const { return 3 * stepping_.seconds() / block_seconds; }
   bool examine_leg_names();
   /// Legs that hardly turn show how they bend, not how they are mounted.
   bool legs_turned() const;
@@ -111,7 +123,7 @@ class Examination {
   bool try_acceleration_hypotheses();
   void examine_leg_size();
   bool accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const;
-  void accuse_leg_shape();
+  void examine_leg_shape();
   void examine_joint_speeds();
   // leg_mount.cpp
   MountFit measure_leg_mount() const;
@@ -167,6 +179,7 @@ class Examination {
   std::optional<LidarWay> lidar_way_;
   std::vector<Turn> lidar_turns_, leg_turns_;
   SenseAgreement lidar_, legs_;
+  Stepping stepping_;
   std::optional<LegHypothesis> leg_mend_;
   std::optional<SO3> leg_start_;              // mount of the IMU on its link, far from the described one, from which that is looked for
   double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock

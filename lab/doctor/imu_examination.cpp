@@ -140,7 +140,9 @@ void Examination::agree_with_gyro() {
     lidar_ = agreement(lidar_turns_, robot_.lidar.T_imu_lidar.R, 0.8);
   }
   if (recorded_.legs.empty() || robot_.legs.type != "joints") return;
-  leg_turns_ = leg_turns(legs_under(nullptr), 0.04);
+  stepping_ = stepping_of(legs_under(nullptr));
+  if (!stepping_.walks()) return;
+  leg_turns_ = leg_turns(legs_under(nullptr), turn_interval);
   legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), 0.5);
   if (lidar_.known || leg_turns_.empty()) return;
   // Without a LiDAR the legs judge the gyro's unit.
@@ -190,10 +192,12 @@ void Examination::accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matr
 
 void Examination::settle_axes() {
   if (!lidar_.known) {
-    // Feet that roll leave much unexplained in any axes, and a walk that hardly leans or turns fits a mirrored gyro as well: other axes must
-    // explain what the described ones cannot.
+    // Feet that roll leave much unexplained in any axes, and a walk that hardly leans or turns fits a mirrored gyro as well: other axes
+    // must explain what the described ones cannot.
     constexpr double clearly = 0.5;  // of what is not explained
     if (!legs_.known || !legs_turned() || 1 - legs_.explained > clearly * (1 - legs_.as_described)) return;
+    const double better = smaller_by(1 - legs_.explained, 1 - legs_.as_described, independent_turns());
+    if (better < sure_among(signed_permutations().size())) return;
     const Eigen::Matrix3d G = nearest_permutation(legs_.error).transpose();
     if (G.determinant() < 0)
       accuse_imu_axes(G, Eigen::Matrix3d::Identity(), "the legs turn as the gyro does only with axes of the other hand");

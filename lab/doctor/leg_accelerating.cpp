@@ -19,13 +19,13 @@ bool Examination::try_acceleration_hypotheses() {
   if (!lidar_way().empty()) return false;
   const SO3 R = robot_.imu.T_link_imu.R;
   const LegAcceleration described = leg_acceleration(nullptr, R, leg_offset_);
-  constexpr double well = 0.95, much_better = 0.3;  // of the acceleration; of what was not explained
+  constexpr double well = 0.95;  // of the acceleration
   if (described.rows == 0 || described.explained > well) return false;
   std::vector<LegHypothesis> all = leg_hypotheses(recorded_legs_, robot_);
   for (LegHypothesis& h : foot_link_hypotheses(robot_)) all.push_back(std::move(h));
   const LegHypothesis* best = nullptr;
   LegAcceleration then;
-  double least = std::min(1 - well, much_better * (1 - described.explained));
+  double least = 1 - well;
   for (const LegHypothesis& h : all) {
     if (h.culprit != Sensor::legs) continue;
     const LegAcceleration other = leg_acceleration(&h, R, leg_offset_);
@@ -40,6 +40,7 @@ bool Examination::try_acceleration_hypotheses() {
     best = &h;
   }
   if (best == nullptr) return false;
+  if (smaller_by(least, 1 - described.explained, std::min(described.independent, then.independent)) < sure_among(all.size())) return false;
   Finding f{best->culprit, best->cause, best->name, {}, best->setting, 0, {}, {}, true};
   f.evidence = fmt::format("{:.1f} % of the acceleration over standing soles is the accelerometer's then, {:.1f} % as described",
                            100 * then.explained, 100 * described.explained);

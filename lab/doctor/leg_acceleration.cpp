@@ -55,6 +55,12 @@ class ForceIntegral {
   }
   /// Integral of the rotation of the IMU, by which its gyro's bias turns.
   const Eigen::Matrix3d& turned(double t) const { return before(t).Rv; }
+  /// Whether some sole bears the robot: in flight it falls, and its accelerometer measures nothing.
+  bool is_borne(double t) const {
+    constexpr double half = 0.025, share = 0.5;  // s, of gravity
+    const Step &a = before(t - half), &b = before(t + half);
+    return (b.v - a.v).norm() > share * gravity().norm() * (b.t - a.t);
+  }
   Eigen::Vector3d gravity() const { return -(steps_.back().v - steps_.front().v) / (steps_.back().t - steps_.front().t); }
   /// Upwards, about this time.
   Eigen::Vector3d up(double t) const {
@@ -153,6 +159,9 @@ Rows rows_of(const std::vector<Moment>& moments, const ForceIntegral& force, con
     if (b->t - last < 0.5 * interval) continue;
     const double shorter = std::min(b->t - moments[a].t, moments[c].t - b->t);
     if (shorter < 0.7 * interval) continue;
+    bool is_borne = true;
+    for (double t = moments[a].t; t <= moments[c].t; t += 0.25 * interval) is_borne = is_borne && force.is_borne(t);
+    if (!is_borne) continue;
     last = b->t;
     out.rows.push_back(row_of({&moments[a], &*b, &moments[c]}, force, p_LI));
     out.seconds.push_back(static_cast<int>(b->t));
@@ -220,12 +229,15 @@ LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const std
   for (int k = 0; k < rounds; ++k) {
     const std::vector<Moment> moments = moments_of(path, force, gyro, T_link_imu.R.inverse(), out.offset);
     const Rows rows = rows_of(moments, force, T_link_imu.p);
-    out.rows = rows.rows.size();
-    if (out.rows < fewest_rows) return out;
+    out.rows = rows.rows.size() < fewest_rows ? 0 : rows.rows.size();
+    if (out.rows == 0) return out;
     found = solve(rows);
     constexpr double most = 0.05;  // s
     if (k + 1 < rounds) out.offset += std::clamp(found.x[of_clock], -most, most);
   }
+  // A row is of two intervals, and the next one begins half of one later.
+  constexpr double overlap = 4;
+  out.independent = 3 * static_cast<double>(out.rows) / overlap - unknowns;
   // Of the two accelerations, what the other unknowns do not explain.
   constexpr int others = unknowns - 1;
   const Eigen::Matrix<double, others, others> H = found.gram.block<others, others>(1, 1);

@@ -19,7 +19,8 @@ struct LegAcceleration {
   double most_scale = 0;                //
   double scale_sigma = 0;               // of either
   Eigen::Vector3d turn, sigma;          // rad, frame of the link: true mount of the link on the IMU = described * Exp(turn)
-  std::size_t rows = 0;
+  std::size_t rows = 0;                 // 0: too few
+  double independent = 0;               // values in them that do not depend on each other
 };
 
 /// `path`: both feet in the frame of the link. `imu`: SI units, IMU frame. Starts from `offset` (s).

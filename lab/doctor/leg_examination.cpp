@@ -77,6 +77,7 @@ Examination::LegScore Examination::score_legs(const std::vector<LegPose>& path, 
   std::size_t still = 0, n = 0;  // poses: since it stands still, and looked at
   std::optional<Eigen::Vector3d> before;
   for (const LegPose& pose : path) {
+    if (!stepping_.bears(pose.t)) continue;
     const double t = pose.t + offset;
     const Eigen::Vector3d apart = pose.foot[1].p[0] - pose.foot[0].p[0], last = std::exchange(before, apart).value_or(apart);
     // A foot in the air is not flat, nor one that rolls from step to step.
@@ -191,6 +192,11 @@ void Examination::examine_legs() {
   }
   if (!examine_leg_names()) return;
   examine_joint_speeds();
+  stepping_ = stepping_of(legs_under(nullptr));
+  if (!stepping_.walks()) {
+    check(Sensor::legs, "mount of the IMU, joints, clock", Check::Verdict::unknown, "the feet do not pass each other often enough: walk");
+    return;
+  }
   leg_turns_ = leg_turns(legs_under(nullptr), turn_interval);
   legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
   // A clock that is off first: any joint looks wrong at another time.
@@ -241,6 +247,7 @@ bool Examination::try_leg_hypotheses() {
   if (cost < well) return false;
   const LegHypothesis* best = nullptr;
   double least = std::min(much_better_legs * cost, cost - well);
+  const double unexplained = 1 - std::max(described.explained, free.explained), flatness = std::min(described.flatness, free.flatness);
   LegScore score;
   std::vector<LegHypothesis> all = leg_hypotheses(recorded_legs_, robot_);
   // Among so many one fits a little by chance: it has to explain nearly all.
@@ -264,6 +271,10 @@ bool Examination::try_leg_hypotheses() {
     score = other;
   }
   if (best == nullptr) return false;
+  const double by_turning = smaller_by(1 - score.explained, unexplained, independent_turns());
+  constexpr double sole_sigma = 3;  // degrees: zeros of three joints, and a floor that is not even
+  const double by_soles = (flatness * flatness - score.flatness * score.flatness) / (sole_sigma * sole_sigma);
+  if (by_turning * std::abs(by_turning) + by_soles < std::pow(sure_among(all.size()), 2)) return false;
   Finding f{best->culprit, best->cause, best->name, {}, best->setting, 0, {}, {}, true};
   f.evidence = fmt::format(
       "{:.0f} % of the legs' turning is that of the gyro then, {:.0f} % as described; the soles are {:.1f} and {:.1f} degrees from flat",

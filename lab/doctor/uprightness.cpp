@@ -11,6 +11,7 @@ namespace kilvo::lab {
 Eigen::Vector3d Examination::up_by_legs() const {
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   for (const LegPose& pose : legs_under(nullptr)) {
+    if (!stepping_.bears(pose.t)) continue;
     for (const FootPose& foot : pose.foot) up -= foot.p[0];
   }
   return up;
@@ -23,10 +24,15 @@ std::optional<double> Examination::tilt_under(const SO3& R_link_imu, bool only_c
   const Eigen::Vector3d up = up_by_legs();
   if (!(up.norm() > 0)) return std::nullopt;
   double least = 180;
-  const std::size_t n = recorded_.imu.size() / parts;
+  std::vector<const InertialSample*> samples;
+  for (const InertialSample& s : recorded_.imu) {
+    if (stepping_.bears(s.t)) samples.push_back(&s);
+  }
+  const std::size_t n = samples.size() / parts;
+  if (n == 0) return std::nullopt;
   for (std::size_t part = 0; part < parts; ++part) {
     Eigen::Vector3d force = Eigen::Vector3d::Zero();
-    for (std::size_t i = part * n; i < (part + 1) * n; ++i) force += accel_axes_ * recorded_.imu[i].accel / static_cast<double>(n);
+    for (std::size_t i = part * n; i < (part + 1) * n; ++i) force += accel_axes_ * samples[i]->accel / static_cast<double>(n);
     if (only_calm && std::abs(force.norm() / gravity - 1) > 0.1) return std::nullopt;
     const Eigen::Vector3d up_link = R_link_imu * force.normalized();
     least = std::min(least, degrees(std::acos(std::clamp(up_link.dot(up.normalized()), -1.0, 1.0))));

@@ -1,0 +1,126 @@
+// What standing legs say of the acceleration: lengths, mount and clock of a walk that is known.
+#include "lab/doctor/leg_acceleration.hpp"
+
+#include <gtest/gtest.h>
+
+#include "lab/doctor/examination.hpp"
+#include "lab/settings/settings.hpp"
+#include "lab/simulation/description.hpp"
+#include "lab/simulation/simulator.hpp"
+
+namespace kilvo::lab {
+namespace leg_acceleration_test {
+
+/// Legs and IMU from one time to another of a simulated walk, which stands for 3 s first.
+struct Walked {
+  Recorded recorded;
+  Robot robot;
+};
+
+Walked walked(const std::string& name, double from, double to) {
+  SimulatorConfig config;
+  config.duration = to;
+  config.use = {true, true, false, false};
+  const std::vector<Scenario> all = scenarios();
+  Simulator simulator(*std::ranges::find(all, name, &Scenario::name), config);
+  Recorder recorder;
+  Walked out;
+  while (const auto measurement = simulator.next()) {
+    if (to_seconds(stamp_of(*measurement) - simulator.start()) >= from) recorder.push(*measurement);
+  }
+  out.recorded = recorder.finish();
+  const std::string urdf = std::string(KILVO_SOURCE_DIR) + "/config/robots/sim.urdf";
+  out.robot = parse_settings(simulated_config(config, urdf), "simulated", ".").robot;
+  out.robot.urdf = urdf_of(config.shape);
+  return out;
+}
+
+/// As Examination asks for it, with what is wrong.
+LegAcceleration measured(const Walked& walk, double scale, const SO3& turn, double late) {
+  RecordedLegs legs(walk.recorded);
+  std::vector<LegPose> path = legs.path(walk.robot, nullptr, pose_period, nullptr);
+  const Eigen::Vector3d p = walk.robot.imu.T_link_imu.p;
+  for (LegPose& pose : path) {
+    pose.t += late;
+    for (FootPose& foot : pose.foot) {
+      for (Eigen::Vector3d& corner : foot.p) corner = p + scale * (corner - p);
+    }
+  }
+  const GyroPath gyro(walk.recorded.imu, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
+  SE3 T_link_imu = walk.robot.imu.T_link_imu;
+  T_link_imu.R = turn * T_link_imu.R;
+  return fit_leg_acceleration(path, walk.recorded.imu, gyro, T_link_imu, 0);
+}
+
+const Walked& a_walk() {
+  static const Walked walk = walked("room", 0, 16);
+  return walk;
+}
+
+TEST(LegAcceleration, OfARightDescriptionIsTheAccelerometers) {
+  const LegAcceleration fit = measured(a_walk(), 1, SO3{}, 0);
+  ASSERT_TRUE(fit.good);
+  EXPECT_GT(fit.explained, 0.95);
+  EXPECT_NEAR(fit.least_scale, 1, 0.02);
+  EXPECT_NEAR(fit.most_scale, 1, 0.04);
+  EXPECT_LT(fit.scale_sigma, 0.02);
+  EXPECT_LT(degrees(fit.turn.norm()), 1);
+  EXPECT_NEAR(fit.offset, 0, 0.002);
+}
+
+TEST(LegAcceleration, TellsTheSizeOfTheLegs) {
+  for (const double scale : {0.85, 1.2, 2.0}) {
+    const LegAcceleration fit = measured(a_walk(), scale, SO3{}, 0);
+    ASSERT_TRUE(fit.good) << scale;
+    EXPECT_NEAR(fit.least_scale / scale, 1, 0.03) << scale;
+    EXPECT_NEAR(fit.most_scale / scale, 1, 0.05) << scale;
+  }
+}
+
+TEST(LegAcceleration, TellsTheMountOfTheImu) {
+  for (const Eigen::Vector3d& by : {Eigen::Vector3d(0, 0.1, 0), Eigen::Vector3d(-0.08, 0, 0.06)}) {
+    const LegAcceleration fit = measured(a_walk(), 1, SO3::Exp(by), 0);
+    ASSERT_TRUE(fit.good) << by.transpose();
+    const SO3 described = (SO3::Exp(by) * a_walk().robot.imu.T_link_imu.R).inverse(), truth = a_walk().robot.imu.T_link_imu.R.inverse();
+    EXPECT_LT(degrees((described * SO3::Exp(fit.turn) * truth.inverse()).Log().norm()), 1.5) << by.transpose();
+  }
+}
+
+TEST(LegAcceleration, TellsTheClockOfTheLegs) {
+  for (const double late : {-0.03, 0.008, 0.06}) EXPECT_NEAR(measured(a_walk(), 1, SO3{}, late).offset, -late, 0.003) << late;
+}
+
+TEST(LegAcceleration, OfARobotThatStandsIsSureOfNothing) {
+  const LegAcceleration fit = measured(walked("stand", 0, 10), 1, SO3{}, 0);
+  EXPECT_TRUE(!fit.good || sure * fit.scale_sigma > fit.least_scale) << fit.least_scale << " +- " << fit.scale_sigma;
+}
+
+// Too few rows are no legs that do not accelerate as the robot does.
+TEST(LegAcceleration, OfAShortWalkIsNotKnown) {
+  const LegAcceleration fit = measured(walked("room", 3, 5.5), 1, SO3{}, 0);
+  EXPECT_FALSE(fit.good);
+  EXPECT_EQ(fit.rows, 0u);
+}
+
+// Rows in which the robot falls freely are none of a sole that stands.
+TEST(LegAcceleration, OfARunnerIsThatOfItsStances) {
+  const LegAcceleration fit = measured(walked("run", 4, 16), 1, SO3{}, 0);
+  EXPECT_TRUE(!fit.good || std::abs(fit.least_scale - 1) < std::max(0.05, sure * fit.scale_sigma)) << fit.least_scale;
+}
+
+// Steps, slabs that shift, soft ground and flight accuse nobody, however short the recording is: 3 s hold too few steps for anything.
+TEST(LegAcceleration, AccusesNoRightDescription) {
+  struct Cut {
+    const char* name;
+    double from, to;
+  };
+  for (const Cut& cut :
+       {Cut{"room", 3, 7}, Cut{"forward", 3, 8}, Cut{"in_place", 3, 7}, Cut{"tiles", 4, 12}, Cut{"run", 7, 16}, Cut{"soft", 3, 8}}) {
+    const Walked walk = walked(cut.name, cut.from, cut.to);
+    const Diagnosis diagnosis = Examination(walk.recorded, walk.robot).run();
+    EXPECT_TRUE(diagnosis.good()) << cut.name << ": " << diagnosis.findings.front().text;
+  }
+}
+
+}  // namespace leg_acceleration_test
+}  // namespace kilvo::lab
