@@ -214,7 +214,7 @@ class Consistency : public testing::Test {
 
   using Runs = std::map<std::array<bool, sensor_count>, std::vector<Samples>>;  // by the sensors that were used
   struct All {
-    Runs runs, known;  // with its own map, with the true one
+    Runs runs, known;                  // with its own map, with the true one
     std::vector<Samples> rigid, worn;  // on the legs alone
 
     All& operator+=(const All& o) {
