@@ -38,7 +38,7 @@ TEST(Levelling, TurnsTheWorldOnceGravityIsKnown) {
   const std::vector<Event> events = events_of(levelling, 4, 5);
   ASSERT_TRUE(levelling.turn());
   ASSERT_EQ(events.size(), 1u) << "once";
-  EXPECT_EQ(text_of(events.front()), "the world was turned by 0.50 degrees, so that its z axis is up");
+  EXPECT_EQ(text_of(events.front()), "the world was rotated by 0.50 degrees, so that its z axis is up");
   EXPECT_EQ(events.front().t, walking(4).t);
   EXPECT_FALSE(levelling.finish()) << "reported already";
   Output o = walking(5);
