@@ -10,8 +10,6 @@
 namespace kilvo {
 namespace {
 
-// Surfaces seen at a flatter angle than this (its sine) are no use.
-constexpr double grazing = 0.12;
 // Views that differ by more show another picture, rad.
 constexpr double most_turned = 0.7;
 
