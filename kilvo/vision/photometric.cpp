@@ -23,7 +23,7 @@ Eigen::Vector3d on_own_ray(const Camera& camera, const Observation& o, const Vis
   const SE3 T_WR = frame.T_CW.inverse();
   const Eigen::Vector3d d = T_WR.R * *ray, n = point.normal_W.cast<double>();
   const double slope = n.dot(d);
-  constexpr double grazing = 0.1, near = 0.1;  // sine, m
+  constexpr double near = 0.1;  // m
   if (std::abs(slope) < grazing * d.norm()) return point.p_W;
   const Eigen::Vector3d p_W = T_WR.p + d * (n.dot(point.p_W - T_WR.p) / slope);
   return (p_W - point.p_W).norm() < near ? p_W : point.p_W;

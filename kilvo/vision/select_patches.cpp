@@ -10,8 +10,6 @@
 namespace kilvo {
 namespace {
 
-// Surfaces seen at a flatter angle than this (its sine) are no use.
-constexpr double grazing = 0.12;
 // Views that differ by more show another picture, rad.
 constexpr double most_turned = 0.7;
 
@@ -42,7 +40,6 @@ struct View {
 
 // The observation whose view is most like this one; of those that are alike, the oldest, which has drifted least.
 bool choose_observation(const View& view, const VisualPoint& p, PatchCandidate& track) {
-  constexpr double alike_scale = 0.25, alike_angle = 0.2;  // octaves, rad
   const Eigen::Vector3d towards = view.eye_W - p.p_W;
   const double distance = towards.norm();
   double best = 1e9;

@@ -44,6 +44,11 @@ inline constexpr std::size_t enough_corners = 8;
 /// With more of them plain patches are neither begun nor looked at.
 inline constexpr std::size_t plenty_of_corners = 24;
 
+/// Surfaces seen at a flatter angle than this (its sine) are not used.
+inline constexpr double grazing = 0.12;
+/// Views of a point that differ by less are alike, and one that differs by more is kept as another one: octaves of scale, rad.
+inline constexpr double alike_scale = 0.4, alike_angle = 0.25;
+
 /// What the camera at T_CW should see of the map.
 std::vector<PatchCandidate> select_patches(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,
                                            const VisionConfig& config);

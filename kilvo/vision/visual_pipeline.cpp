@@ -15,8 +15,6 @@
 namespace kilvo {
 namespace {
 
-// A view that differs so much from those that a point has is kept as well: octaves of scale, rad.
-constexpr double new_scale = 0.4, new_angle = 0.25;
 // So many patches hold a pose by themselves; of those that should be seen, one in so many is found.
 constexpr int enough = 20, one_in = 5;
 
@@ -28,7 +26,7 @@ bool carries_estimate(const PhotometricModel::Report& report) {
 
 bool is_new_view(const PatchCandidate& track) {
   const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(track.warp.A.determinant()))));
-  return octaves > new_scale || track.view_angle > new_angle;
+  return octaves > alike_scale || track.view_angle > alike_angle;
 }
 
 // The visual correction of the pose is applied to new patches only along directions that the LiDAR does not measure. Elsewhere patches are

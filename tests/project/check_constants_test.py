@@ -4,7 +4,7 @@ import unittest
 
 from planted_tree import PlantedTree
 
-LIMIT = 457
+LIMIT = 454
 
 
 class CheckConstants(PlantedTree):
