@@ -168,7 +168,9 @@ Diagnosis Examination::run() {
   blame_imu_for_all();
   const bool legs = recorded_.legs.size() >= 100 && robot_.legs.type == "joints";
   const bool open = std::ranges::any_of(diagnosis_.seems_wrong, std::identity());
-  diagnosis_.settled = !open && (recorded_.sweeps.size() < 30 || lidar_.known) && (!legs || (legs_.known && legs_turned()));
+  // Where no LiDAR's way tells whether the soles stand, their acceleration does.
+  const bool accelerated = !lidar_way().empty() || leg_acceleration_.rows > 0;
+  diagnosis_.settled = !open && (recorded_.sweeps.size() < 30 || lidar_.known) && (!legs || (legs_.known && legs_turned() && accelerated));
   return diagnosis_;
 }
 

@@ -99,8 +99,8 @@ class Examination {
   void examine_lidar_position();
   // leg_examination.cpp
   void examine_legs();
-  /// Of the legs' turning: soles that roll do so alike within a step.
-  double independent_turns() const { return 3 * stepping_.seconds() / block_seconds; }
+  /// Of the legs' turning: a sole rolls one way for half of a quick step.
+  double independent_turns() const { return 3 * stepping_.seconds() / 0.25; }
   bool examine_leg_names();
   /// Legs that hardly turn show how they bend, not how they are mounted.
   bool legs_turned() const;

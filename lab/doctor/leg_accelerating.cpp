@@ -40,7 +40,10 @@ bool Examination::try_acceleration_hypotheses() {
     best = &h;
   }
   if (best == nullptr) return false;
-  if (smaller_by(least, 1 - described.explained, std::min(described.independent, then.independent)) < sure_among(all.size())) return false;
+  if (smaller_by(least, 1 - described.explained, std::min(described.independent, then.independent)) < sure_among(all.size())) {
+    seems_wrong(best->culprit) = true;
+    return false;
+  }
   Finding f{best->culprit, best->cause, best->name, {}, best->setting, 0, {}, {}, true};
   f.evidence = fmt::format("{:.1f} % of the acceleration over standing soles is the accelerometer's then, {:.1f} % as described",
                            100 * then.explained, 100 * described.explained);

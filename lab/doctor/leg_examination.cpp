@@ -274,7 +274,10 @@ bool Examination::try_leg_hypotheses() {
   const double by_turning = smaller_by(1 - score.explained, unexplained, independent_turns());
   constexpr double sole_sigma = 3;  // degrees: zeros of three joints, and a floor that is not even
   const double by_soles = (flatness * flatness - score.flatness * score.flatness) / (sole_sigma * sole_sigma);
-  if (by_turning * std::abs(by_turning) + by_soles < std::pow(sure_among(all.size()), 2)) return false;
+  if (by_turning * std::abs(by_turning) + by_soles < std::pow(sure_among(all.size()), 2)) {
+    seems_wrong(best->culprit) = true;
+    return false;
+  }
   Finding f{best->culprit, best->cause, best->name, {}, best->setting, 0, {}, {}, true};
   f.evidence = fmt::format(
       "{:.0f} % of the legs' turning is that of the gyro then, {:.0f} % as described; the soles are {:.1f} and {:.1f} degrees from flat",

@@ -41,6 +41,10 @@ double prior_variance(const std::vector<double>& change, const std::vector<doubl
   return low;
 }
 
+// The same of one component by itself: what another one is off by says little of it. B. Efron, C. Morris, "Limiting the risk of Bayes and
+// empirical Bayes estimators", 1972.
+double own_share(double change, double sigma) { return change != 0 ? std::max(0.0, 1 - sigma * sigma / (change * change)) : 0; }
+
 }  // namespace
 
 bool Refinement::is_taken() const {
@@ -62,7 +66,7 @@ Refinement refinement(Sensor sensor, const std::string& what, std::vector<double
     out.significant = out.significant || (known && std::abs(change[i]) > significant_change * sigma[i]);
     // Of a single number no estimator is better than what is described wherever that is right (C. Stein, 1956): it must be significant.
     const bool is_taken = known && (change.size() > 1 || out.significant);
-    out.taken.push_back(is_taken ? change[i] * variance / (variance + sigma[i] * sigma[i]) : 0);
+    out.taken.push_back(is_taken ? change[i] * std::min(variance / (variance + sigma[i] * sigma[i]), own_share(change[i], sigma[i])) : 0);
   }
   out.change = std::move(change);
   out.sigma = std::move(sigma);

@@ -31,6 +31,9 @@ Stepping stepping_of(const std::vector<LegPose>& path) {
     }
     side = s > 0 ? 1 : -1;
   }
+  // A foot that stood beside the other passes it in the second step.
+  constexpr int first_steps = 2;
+  if (out.steps > 1) out.begin -= first_steps * (out.end - out.begin) / (out.steps - 1);
   return out;
 }
 

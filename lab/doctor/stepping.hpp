@@ -10,7 +10,7 @@ namespace kilvo::lab {
 
 struct Stepping {
   int steps = 0;              // times that the one foot passed the other
-  double begin = 0, end = 0;  // s, of the first and the last
+  double begin = 0, end = 0;  // s, of the first step and of the last time
   bool walks() const { return steps >= fewest; }
   /// The soles bear the robot then: it walks, or is about to.
   bool bears(double t) const { return walks() && t > begin - stands_before && t < end + stands_before; }
@@ -18,7 +18,7 @@ struct Stepping {
 
  private:
   static constexpr int fewest = 4;              // steps: two with each foot
-  static constexpr double stands_before = 1.5;  // s: a robot stands before it walks, and its first step takes less
+  static constexpr double stands_before = 1.5;  // s: a robot stands before it walks
 };
 
 /// Under any description of the legs: signs, names and lengths that are wrong do not change how often the feet pass each other.
