@@ -4,6 +4,7 @@ from typing import Callable, Iterator
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 4, 5, 6, 7
+POINTS = "/points"  # of sensor_msgs/PointCloud2
 STAMP = 4  # of a message that begins with std_msgs/Header: behind its sequence number
 
 # Takes a topic, the seconds of arrival since the first message, the arrival and the stamp (ns); gives the new arrival and stamp.
@@ -39,6 +40,31 @@ def number(bag: bytearray, at: int) -> int:
     return struct.unpack_from("<I", bag, at)[0]
 
 
+def shift_points(bag: bytearray, at: int, by: int) -> None:
+    """The times of the points of the sensor_msgs/PointCloud2 at this place, as far as they are absolute: of its field "timestamp"."""
+    def text() -> bytes:
+        nonlocal at
+        length = number(bag, at)
+        at += 4 + length
+        return bytes(bag[at - length:at])
+
+    at += 12  # sequence number, stamp
+    text()    # frame
+    at += 8   # height, width
+    fields = {}
+    at += 4
+    for _ in range(number(bag, at - 4)):
+        name = text()
+        fields[name] = number(bag, at)
+        at += 9
+    step, size = number(bag, at + 1), number(bag, at + 9)
+    if b"timestamp" not in fields:
+        return
+    for point in range(at + 13 + fields[b"timestamp"], at + 13 + size, step):
+        (time,) = struct.unpack_from("<d", bag, point)
+        struct.pack_into("<d", bag, point, time + by)
+
+
 def edit_times(bag: bytearray, edit: Edit) -> None:
     topics: dict[int, str] = {}
     arrivals: dict[int, dict[int, int]] = {}  # by chunk, by place within it
@@ -59,7 +85,10 @@ def edit_times(bag: bytearray, edit: Edit) -> None:
                 elif bag[inner["op"]] == MESSAGE:
                     arrival, stamp = read_time(bag, inner["time"]), read_time(bag, inner_data + STAMP)
                     first = arrival if first is None else first
+                    was = stamp
                     arrival, stamp = edit(topics[connection], (arrival - first) / 1e9, arrival, stamp)
+                    if topics[connection] == POINTS and stamp != was:
+                        shift_points(bag, inner_data, stamp - was)
                     write_time(bag, inner["time"], arrival)
                     write_time(bag, inner_data + STAMP, stamp)
                     arrivals[chunk_at][inner_at - chunk_data] = arrival
