@@ -13,7 +13,7 @@ constexpr double significant_change = 3;  // standard deviations
 
 std::string numbers(const std::vector<double>& x) {
   std::vector<std::string> out;
-  for (const double v : x) out.push_back(fmt::format("{:.4g}", v));
+  for (const double v : x) out.push_back(fmt::format("{:.4g}", v + 0.0));  // no "-0"
   return fmt::format("({})", fmt::join(out, ", "));
 }
 
