@@ -1,5 +1,6 @@
 #include "kilvo/filter/gain.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace kilvo {
@@ -39,7 +40,8 @@ struct Column {
 }  // namespace
 
 KILVO_WIDE void project_rows(const Covariance& P, const double* H, int rows, double* S, double* W) {
-  double of_row[at::size][most_rows] = {};  // W by rows
+  double of_row[at::size][lanes * packs];  // W by rows; of the columns that a pack reads
+  for (auto& row : of_row) std::fill_n(row, (rows + lanes - 1) / lanes * lanes, 0.0);
   for (int i = 0; i < rows; ++i) {
     const double* h = H + i * at::size;
     int touched[at::size], count = 0;
@@ -51,7 +53,7 @@ KILVO_WIDE void project_rows(const Covariance& P, const double* H, int rows, dou
     }
     write(w, W + i * at::size);
     for (int j = 0; j < at::size; ++j) of_row[j][i] = W[i * at::size + j];
-    double s[most_rows] = {};
+    double s[lanes * packs] = {};
     for (int k = 0; k <= i; ++k) s[k] = S[k * rows + i];
     for (int first = 0; first <= i; first += lanes) {
       Pack sum = *reinterpret_cast<const Pack*>(s + first);

@@ -12,10 +12,7 @@
 
 namespace kilvo {
 
-/// Rows of a Gain, or of a prediction.
-inline constexpr int most_rows = 16;
-
-/// W = P H' and the lower triangle of S += H W; of H (`rows` by at::size, row-major, at most most_rows) zeros cost nothing. W and S are
+/// W = P H' and the lower triangle of S += H W; of H (`rows` by at::size, row-major, fewer than at::size) zeros cost nothing. W and S are
 /// column-major.
 void project_rows(const Covariance& P, const double* H, int rows, double* S, double* W);
 
@@ -33,7 +30,7 @@ void reduce(const Covariance& P, const double* W, int rows, Covariance& out);
 /// S = H P H' + R = L L', W = P H' L^-T: the gain is W L^-1 and the posterior covariance P - W W', symmetric by construction.
 template <int Max>
 class Gain {
-  static_assert(Max <= most_rows);
+  static_assert(Max < at::size);
 
  public:
   using Columns = Eigen::Matrix<double, at::size, Eigen::Dynamic, 0, at::size, Max>;
