@@ -5,13 +5,13 @@
 namespace kilvo {
 
 double UsualAcceleration::deviation(const Eigen::Vector3d& accel, double dt) {
-  constexpr double statistics_time = 2.0;  // s
-  constexpr double least_variance = 1e-4;  // (m/s^2)^2
+  constexpr double statistics_time = 2.0, least_variance = 1e-4;  // s, (m/s^2)^2
   if (mean_.isZero(0)) mean_ = accel;
   const Eigen::Vector3d off = accel - mean_;
   const double out = (off.array().abs() / (variance_.array() + least_variance).sqrt()).sum();
-  mean_ += dt / statistics_time * off;
-  variance_ += dt / statistics_time * (off.cwiseAbs2() - variance_);
+  const double share = std::clamp(dt / statistics_time, 0.0, 1.0);
+  mean_ += share * off;
+  variance_ += share * (off.cwiseAbs2() - variance_);
   return out;
 }
 

@@ -65,5 +65,16 @@ TEST(StationarityDetector, TakesAnImpactForUnusualAndForgetsIt) {
   EXPECT_TRUE(detector.is_usual(s.t, std::chrono::milliseconds(20)));
 }
 
+// Samples that are ten seconds apart: what is usual is then the last of them.
+TEST(UsualAcceleration, StaysFiniteAfterALongGap) {
+  UsualAcceleration usual;
+  usual.deviation({0, 0, 9.8}, 0.005);
+  for (int i = 0; i < 20; ++i) {
+    const double deviation = usual.deviation({0, i % 2 == 0 ? 3.0 : -3.0, 9.8}, 10);
+    EXPECT_TRUE(std::isfinite(deviation)) << i;
+    EXPECT_GE(deviation, 0) << i;
+  }
+}
+
 }  // namespace stationarity_test
 }  // namespace kilvo

@@ -297,15 +297,18 @@ TEST_F(Consistency, InAKnownWorldTheErrorOfKilIsWhatTheCovarianceSays) {
   expect_mean("velocity", all_.known.at(kil), &Sample::velocity, 3);
 }
 
-TEST_F(Consistency, OnLegsOfKnownNoiseVelocityAndTiltAreAsGoodAsTheCovarianceSays) {
-  // The noise of the soles is learnt while the robot walks, with a floor: on soles that do not move at all the covariance stays the larger.
+// Of velocity and tilt, on the legs alone.
+void expect_as_good_as_known(const std::vector<Samples>& runs) {
   for (const auto& [name, part, degrees] : {std::tuple("velocity", &Sample::velocity, 3.0), std::tuple("tilt", &Sample::tilt, 2.0)}) {
-    const double mean = share(all_.rigid, part, 0, limits(degrees, all_.rigid.size()).high).mean / degrees;
+    const double mean = Consistency::share(runs, part, 0, limits(degrees, runs.size()).high).mean / degrees;
     testing::Test::RecordProperty(name, std::to_string(mean));
     EXPECT_GT(mean, 0.4) << name;
     EXPECT_LT(mean, 2.0) << name;
   }
 }
+
+// The noise of the soles is learnt while the robot walks, with a floor: on soles that do not move at all the covariance stays the larger.
+TEST_F(Consistency, OnLegsOfKnownNoiseVelocityAndTiltAreAsGoodAsTheCovarianceSays) { expect_as_good_as_known(all_.rigid); }
 
 // With the noise that is shipped only from above: what a standing foot of a real robot does, settle, bend and roll, on any floor, is in it,
 // and a simulated sole on a rigid floor does none of that.
@@ -320,14 +323,7 @@ TEST_F(Consistency, OnTheLegsAloneVelocityAndTiltAreNotBelievedMoreThanTheyAreKn
 }
 
 // Encoders with other zeros, links of other lengths, soles that give way: what no density of the noise has.
-TEST_F(Consistency, OnWornLegsAloneVelocityAndTiltAreAsGoodAsTheCovarianceSays) {
-  for (const auto& [name, part, degrees] : {std::tuple("velocity", &Sample::velocity, 3.0), std::tuple("tilt", &Sample::tilt, 2.0)}) {
-    const double mean = share(all_.worn, part, 0, limits(degrees, all_.worn.size()).high).mean / degrees;
-    testing::Test::RecordProperty(name, std::to_string(mean));
-    EXPECT_GT(mean, 0.4) << name;
-    EXPECT_LT(mean, 2.0) << name;
-  }
-}
+TEST_F(Consistency, OnWornLegsAloneVelocityAndTiltAreAsGoodAsTheCovarianceSays) { expect_as_good_as_known(all_.worn); }
 
 }  // namespace walk_test
 }  // namespace kilvo
