@@ -78,6 +78,7 @@ class Examination {
   void examine_acceleration_unit();
   void agree_with_gyro();
   void settle_axes();
+  void examine_gyro_scale(const std::vector<Turn>& turns, const MountFit& fit);
   void accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence);
   /// `only_calm`: none when what the accelerometer measures does not average to gravity.
   std::optional<double> tilt_under(const SO3& R_link_imu, bool only_calm) const;
@@ -97,11 +98,13 @@ class Examination {
   bool lidar_is_nearer(const Eigen::Vector3d& p, const Eigen::Vector3d& other, const SO3& R_IL) const;
   void examine_lidar_clock(const MountFit& fit);
   void examine_lidar_position();
+  bool examine_lidar_scale();
   // leg_examination.cpp
   void examine_legs();
   /// Of the legs' turning: a sole rolls one way for half of a quick step.
   double independent_turns() const { return 3 * stepping_.seconds() / 0.25; }
   bool examine_leg_names();
+  bool examine_joint_values();
   /// Legs that hardly turn show how they bend, not how they are mounted.
   bool legs_turned() const;
   bool feet_stand() const;
@@ -131,6 +134,7 @@ class Examination {
   void examine_leg_clock(const MountFit& fit, double method, double tolerance);
   bool turns_with_link(const LegHypothesis& other) const;
   void refine_zeros(const StanceFit& stances);
+  bool find_wrong_zero(const StanceFit& stances, const Robot& start);
   void settle_imu_link(const SO3& measured);
   struct LegWay {
     double scale = 1, sigma = 0;  // way by the legs through way by the LiDAR
@@ -140,6 +144,7 @@ class Examination {
   LegWay measure_leg_way(const LegHypothesis* hypothesis) const;
   bool accuse_exchanged_legs(double scale, const std::string& evidence);
   void examine_leg_lengths();
+  bool lidar_is_too_large(double scale, const std::string& evidence);
   void accuse_leg_lengths(double scale, double height);
   void accuse_imu_place(double height);
   std::string link_at_height(double height) const;
@@ -184,6 +189,7 @@ class Examination {
   std::optional<SO3> leg_start_;              // mount of the IMU on its link, far from the described one, from which that is looked for
   double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock
   std::optional<TranslationFit> translation_;
+  WayScale lidar_scale_;  // of the LiDAR's way, by the acceleration
   std::optional<StanceFit> stances_;
   LegAcceleration leg_acceleration_;  // under the mount that was settled
   Diagnosis diagnosis_;

@@ -1,15 +1,15 @@
 #include "lab/doctor/leg_hypotheses.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/core.h>
 #include <regex>
 #include <sstream>
 
 namespace kilvo::lab {
-namespace {
+namespace {}  // namespace
 
-// "left_knee_joint" -> "right_knee_joint"; the same name when it has no side.
 std::string other_side(const std::string& name) {
   constexpr const char* pairs[][2] = {{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"}};
   for (const auto& pair : pairs) {
@@ -24,6 +24,8 @@ std::string other_side(const std::string& name) {
   if (name.starts_with("R_")) return "L_" + name.substr(2);
   return name;
 }
+
+namespace {
 
 bool has_side(const std::string& name) { return other_side(name) != name; }
 
@@ -81,6 +83,44 @@ std::vector<LegHypothesis> exchanges(const std::vector<std::size_t>& joints, con
   return out;
 }
 
+// Several joints of one leg, or the same of both, turn the other way round: a leg that is mirrored, axes of another convention.
+std::vector<LegHypothesis> sign_hypotheses(const std::vector<std::size_t>& joints, const std::vector<std::string>& names) {
+  std::array<std::vector<std::size_t>, 2> legs;
+  for (const std::size_t i : joints) {
+    const auto j = static_cast<std::size_t>(std::ranges::find(names, other_side(names[i])) - names.begin());
+    if (j == names.size() || j == i || std::ranges::find(legs[1], i) != legs[1].end()) continue;
+    legs[0].push_back(i);
+    legs[1].push_back(j);
+  }
+  std::vector<LegHypothesis> out;
+  constexpr std::size_t most = 7;  // joints of a leg
+  const std::size_t n = legs[0].size();
+  if (n > most) return out;
+  for (unsigned set = 1; set < 1U << n; ++set) {
+    for (unsigned which = 1; which <= 3; ++which) {  // the first leg, the second, both
+      std::vector<std::size_t> turned;
+      std::string text;
+      for (std::size_t k = 0; k < n; ++k) {
+        for (std::size_t leg = 0; leg < 2; ++leg) {
+          if ((set >> k & which >> leg & 1U) == 0) continue;
+          turned.push_back(legs[leg][k]);
+          text += (text.empty() ? "" : ", ") + names[turned.back()];
+        }
+      }
+      if (turned.size() < 2) continue;  // one by itself is tried anyway
+      LegHypothesis h;
+      h.cause = "joint_sign";
+      h.name = fmt::format("joints {} turn the other way round", text);
+      h.setting = "the axes of these joints in robot.urdf, or their signs in the driver";
+      h.position = [turned](std::size_t i, double& q) {
+        if (std::ranges::find(turned, i) != turned.end()) q = -q;
+      };
+      out.push_back(h);
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot& robot) {
@@ -93,6 +133,7 @@ std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot&
   all.setting = "the axes of the joints in robot.urdf, or their signs in the driver";
   all.position = [](std::size_t, double& q) { q = -q; };
   out.push_back(all);
+  for (LegHypothesis& h : sign_hypotheses(joints, names)) out.push_back(std::move(h));
   for (std::size_t k = 0; k < joints.size(); ++k) {
     const std::size_t i = joints[k];
     for (const double turn : {90.0, -90.0, 180.0}) {

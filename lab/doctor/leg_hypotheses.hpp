@@ -8,8 +8,12 @@ namespace kilvo::lab {
 /// Names that are exchanged or shifted, joints that turn the other way.
 std::vector<LegHypothesis> leg_hypotheses(RecordedLegs& legs, const Robot& robot);
 
-/// Zeros that are off by a quarter of a turn, joints of one leg that are exchanged, all signs: many, for legs that make no sense otherwise.
+/// Zeros that are off by a quarter of a turn, joints of one leg that are exchanged, several signs: many, for legs that make no sense
+/// otherwise.
 std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot& robot);
+
+/// "left_knee_joint" -> "right_knee_joint"; the same name when it has no side.
+std::string other_side(const std::string& name);
 
 /// Joint positions are in degrees.
 LegHypothesis degrees_hypothesis();

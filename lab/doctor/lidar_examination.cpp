@@ -26,11 +26,16 @@ std::vector<SweepPose> mirrored(std::vector<SweepPose> way, const Eigen::Matrix3
 
 void Examination::examine_lidar() {
   const std::size_t clouds = recorded_.stamps[static_cast<std::size_t>(Sensor::lidar)].count;
-  if (clouds >= 30 && recorded_.sweeps.size() < clouds / 10) {
+  const double far_share = static_cast<double>(recorded_.far_points) / static_cast<double>(std::max<std::size_t>(recorded_.points, 1));
+  constexpr double most_far = 0.9;
+  const bool none_in_reach = recorded_.sweeps.size() < clouds / 10;
+  if (clouds >= 30 && (none_in_reach || far_share > most_far)) {
     find({Sensor::lidar,
           "lidar_unit",
-          "hardly a point of the clouds is between 0.5 and 200 m: they are not in metres",
-          fmt::format("{} of {} clouds have such points", recorded_.sweeps.size(), clouds),
+          none_in_reach ? std::string("hardly a point of the clouds is between 0.5 and 200 m: they are not in metres")
+                        : fmt::format("most points of the clouds are farther than {:.0f} m: they are not in metres", far_away),
+          fmt::format("{} of {} clouds have points between 0.5 and 200 m; {:.0f} % of all points are beyond {:.0f} m",
+                      recorded_.sweeps.size(), clouds, 100 * far_share, far_away),
           "the driver must publish metres",
           0,
           "",
@@ -75,6 +80,7 @@ MountFit Examination::examine_lidar_rotation() {
   lidar_.offset = fit.offset;
   lidar_.error = (fit.R * described.inverse()).matrix();
   lidar_offset_ = fit.offset;
+  examine_gyro_scale(turns, fit);
   constexpr double method = 0.1;  // degrees: the gyro's own misalignment is taken for the mount's
   refine_rotation(Sensor::lidar, "rotation of the LiDAR on the IMU", described, fit.R, fit.rotation_sigma(), method, "lidar.T_imu_lidar.R");
   const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();

@@ -27,6 +27,8 @@ void Examination::examine_lidar_position() {
     check(Sensor::lidar, "position of the mount", Check::Verdict::unknown, "too few sweeps in a row that know their way");
     return;
   }
+  lidar_scale_ = rows.scale(accel_axes_, *translation_);
+  if (examine_lidar_scale()) return;
   const TranslationFit& fit = *translation_;
   const Eigen::Vector3d described = robot_.lidar.T_imu_lidar.p, error = fit.r - described;
   const Eigen::Vector3d sigma(fit.sigma_r(0), fit.sigma_r(1), fit.sigma_r(2));
@@ -68,6 +70,25 @@ void Examination::examine_lidar_position() {
   f.changes = {{"lidar.T_imu_lidar.p", vector_text(right)}};
   robot_.lidar.T_imu_lidar.p = right;
   find(std::move(f));
+}
+
+// By the acceleration alone: points of another unit. What is off by less shows against the legs as well.
+bool Examination::examine_lidar_scale() {
+  constexpr double tolerance = 0.1;
+  const WayScale& s = lidar_scale_;
+  if (s.distance_to(1) < sure || (s.factor < 1 + tolerance && s.most > 1 - tolerance)) return false;
+  find({Sensor::lidar,
+        "lidar_unit",
+        fmt::format("the LiDAR's points are {:.2f} times as far as they should be", s.factor),
+        fmt::format("way of the sweeps through that of the accelerometer: {:.3f}, standard deviation {:.3f}", s.factor, s.sigma),
+        "the driver must publish metres",
+        s.factor,
+        "",
+        {},
+        true});
+  translation_.reset();
+  way_.clear();
+  return true;
 }
 
 }  // namespace kilvo::lab

@@ -63,6 +63,10 @@ void Recorder::take(const LidarScan& scan) {
     const LidarPoint& p = scan.points[i];
     const Eigen::Vector3f x(p.x, p.y, p.z);
     const float range = x.norm();
+    if (std::isfinite(range) && range > 0) {
+      ++recorded_.points;
+      recorded_.far_points += range > far_away ? 1 : 0;
+    }
     if (!(range > nearest_point && range < 200)) continue;
     sweep.points.push_back({x, 1e-9F * static_cast<float>(p.offset_ns)});
   }

@@ -39,6 +39,8 @@ struct StampStatistics {
   double period = 0;  // s, median between stamps
 };
 
+inline constexpr float far_away = 50;  // m: a robot on the ground sees most of what it sees nearer
+
 /// Times are seconds since `origin`, the first stamp of all.
 struct Recorded {
   std::int64_t origin = 0;  // ns
@@ -46,7 +48,8 @@ struct Recorded {
   std::vector<std::string> joint_names;
   std::vector<LegSample> legs;  // at most 250 per second
   std::vector<Sweep> sweeps;
-  std::vector<TrackedPair> tracks;  // of consecutive images
+  std::size_t points = 0, far_points = 0;  // looked at for sweeps; farther than `far_away`
+  std::vector<TrackedPair> tracks;         // of consecutive images
   int image_width = 0, image_height = 0;
   std::array<StampStatistics, sensor_count> stamps;
   bool joint_names_change = false;

@@ -13,7 +13,7 @@ constexpr int passes = 3;
 }  // namespace
 
 StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
-                      double offset) {
+                      double offset, std::optional<std::size_t> free_joint) {
   StanceFit out;
   Stances stances(legs, robot, hypothesis, way, gyro, offset, true);
   const Eigen::Index n = stances.unknowns();
@@ -22,6 +22,7 @@ StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesi
   prior.segment<3>(Stances::of_p).setConstant(prior_p);
   prior[Stances::of_offset] = INFINITY;
   prior[Stances::of_scale] = prior_scale;
+  if (free_joint) prior[Stances::of_zeros + static_cast<Eigen::Index>(*free_joint)] = INFINITY;
   step.setConstant(1e-4);
   step[Stances::of_offset] = Stances::clock_step;
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(n);

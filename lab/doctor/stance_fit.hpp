@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,9 +26,10 @@ struct StanceFit {
   std::size_t stances = 0;
 };
 
-/// `hypothesis`: of the legs, may be null. Starts from robot.imu.T_link_imu and `offset`.
+/// `hypothesis`: of the legs, may be null. Starts from robot.imu.T_link_imu and `offset`. `free_joint`, of `joints`: its zero may be
+/// anything.
 StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
-                      double offset);
+                      double offset, std::optional<std::size_t> free_joint = std::nullopt);
 
 struct Standing {
   std::array<double, 2> of{};  // s, by foot, in which its sole stands while the robot moves

@@ -194,6 +194,41 @@ std::optional<TranslationFit> TranslationRows::refine(const Eigen::Matrix3d& axe
   return out;
 }
 
+WayScale TranslationRows::scale(const Eigen::Matrix3d& axes, const TranslationFit& from) const {
+  constexpr Eigen::Index n = 10;  // the place, gravity and the bias again, and the factor
+  Vector9 elements;
+  for (int i = 0; i < 3; ++i) elements.segment<3>(3 * i) = axes.row(i).transpose();
+  Eigen::VectorXd x(n);
+  x << from.r, from.g_W, from.ba, 1;
+  double moved = 0, left = 0;
+  std::vector<Block> blocks;
+  Eigen::MatrixXd H;
+  for (int k = 0; k < 4; ++k) {
+    blocks.assign(1, Block(n));
+    moved = left = 0;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const Row& row = rows_[i];
+      Eigen::Matrix<double, 3, n> J;
+      J << row.H_r, row.dt * Eigen::Matrix3d::Identity(), row.H_ba, row.force * elements;
+      const Eigen::Vector3d e = row.y - J * x;
+      const double weight = 1 / (1 + e.squaredNorm() / (12 * from.rms * from.rms));
+      if (i > 0 && static_cast<int>(rows_[i - 1].t / block_seconds) != static_cast<int>(row.t / block_seconds)) blocks.emplace_back(n);
+      blocks.back().H += weight * J.transpose() * J;
+      blocks.back().g += weight * J.transpose() * e;
+      moved += weight * (J.col(n - 1) + row.dt * from.g_W).squaredNorm();
+      left += weight * e.squaredNorm();
+    }
+    H = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
+    for (const Block& b : blocks) H += b.H, g += b.g;
+    H.diagonal().array() += 1e-9;  // of what does not show
+    x += H.ldlt().solve(g);
+  }
+  const double factor = x[n - 1], attenuation = 1 - left / moved;
+  if (!(x.allFinite() && factor > 0 && moved > 0)) return {};
+  return {factor, std::sqrt(jackknife(blocks, H)(n - 1, n - 1)), attenuation > 0 ? factor / attenuation : INFINITY};
+}
+
 std::vector<Eigen::Matrix3d> signed_permutations() {
   constexpr int orders[6][3] = {{0, 1, 2}, {1, 0, 2}, {0, 2, 1}, {2, 1, 0}, {1, 2, 0}, {2, 0, 1}};
   std::vector<Eigen::Matrix3d> out;

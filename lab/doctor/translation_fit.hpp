@@ -1,6 +1,8 @@
 // Where the LiDAR sits on the IMU, and whether the accelerometer's axes are what they seem, from the LiDAR's way and the specific force.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -19,6 +21,16 @@ struct TranslationFit {
   double sigma_r(int i) const;
 };
 
+/// A way through that of the accelerometer.
+struct WayScale {
+  double factor = 1, sigma = INFINITY;
+  /// The accelerometer's noise makes a slope of least squares too small: were it all that is not explained, it would be this (at least
+  /// `factor`; infinite where nothing is explained).
+  double most = INFINITY;
+  /// How far (in standard deviations) it is from a factor, which noise may have made smaller.
+  double distance_to(double other) const { return std::max({0.0, factor - other, other - most}) / sigma; }
+};
+
 /// The rows of p_{k+1} - 2 p_k + p_{k-1} against the doubly integrated specific force, for any axes of the accelerometer.
 class TranslationRows {
  public:
@@ -28,6 +40,8 @@ class TranslationRows {
   std::size_t size() const { return rows_.size(); }
   /// `axes`: takes what the accelerometer wrote to m/s^2 in the IMU frame. None with too few rows.
   std::optional<TranslationFit> fit(const Eigen::Matrix3d& axes) const;
+  /// Of the sensor's way against the acceleration, from a fit with the same axes.
+  WayScale scale(const Eigen::Matrix3d& axes, const TranslationFit& from) const;
   /// The same with a place of the LiDAR that is some times as precise: an accelerometer's axes may be a little off, and each row's noise is
   /// predicted from those before (L. Ljung, "System identification", 1999, prediction errors): the noise of a place is in three rows.
   std::optional<TranslationFit> refine(const Eigen::Matrix3d& axes) const;

@@ -264,6 +264,39 @@ MountFit refine_mount(const std::vector<Turn>& turns, const GyroPath& gyro, cons
   return fit.good ? mount_of(fit, turns, gyro, start.R, start.offset) : start;
 }
 
+std::pair<double, double> gyro_scale(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& fit) {
+  struct Block {
+    Eigen::Matrix<double, 1, 1> H = Eigen::Matrix<double, 1, 1>::Zero(), g = H;
+  };
+  double share = 1, scale = 0;  // the sensor's turning through the gyro's; robust standard deviation of a rate
+  std::vector<Block> blocks;
+  Eigen::Matrix<double, 1, 1> H;
+  for (int k = 0; k < 4; ++k) {
+    blocks.assign(1, {});
+    std::vector<double> errors;
+    double until = -1;
+    for (const Turn& turn : turns) {
+      const double a = turn.a + fit.offset, b = turn.b + fit.offset, dt = turn.b - turn.a;
+      if (!gyro.covers(a, b)) continue;
+      const Eigen::Vector3d expected = fit.R.inverse() * Eigen::Vector3d(log_of(gyro.between(a, b)) / dt - fit.bias);
+      const Eigen::Vector3d e = nearest(turn, dt * expected * share) / dt - share * expected;
+      errors.push_back(e.norm());
+      const double weight = k == 0 ? 1 : 1 / (1 + e.squaredNorm() / (4 * scale * scale));
+      if (until >= 0 && static_cast<int>(until / block_seconds) != static_cast<int>(turn.a / block_seconds)) blocks.emplace_back();
+      until = turn.a;
+      blocks.back().H(0) += weight * expected.squaredNorm();
+      blocks.back().g(0) += weight * expected.dot(e);
+    }
+    scale = median_of(errors) + 1e-6;
+    H.setZero();
+    double g = 0;
+    for (const Block& block : blocks) H += block.H, g += block.g(0);
+    if (!(H(0) > 0)) return {1, INFINITY};
+    share += g / H(0);
+  }
+  return {1 / share, std::sqrt(jackknife(blocks, H)(0)) / (share * share)};
+}
+
 std::vector<Turn> best_half(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& fit) {
   std::vector<double> errors;
   for (const Turn& turn : turns) {

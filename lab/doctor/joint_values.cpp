@@ -1,0 +1,75 @@
+// What the positions of the joints show by themselves, without any description: joints that never turn, joints that show another's angle.
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+
+#include "lab/doctor/examination.hpp"
+#include "lab/doctor/leg_hypotheses.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+constexpr double at_rest = 1e-3;  // rad: no joint of a leg that walks turns by less in all
+constexpr double turns = 0.05;    // rad
+
+struct Range {
+  double low = INFINITY, high = -INFINITY;
+  double size() const { return high - low; }
+};
+
+std::vector<Range> ranges_of(const std::vector<LegSample>& legs) {
+  std::vector<Range> out(legs.front().position.size());
+  for (const LegSample& s : legs) {
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = {std::min(out[i].low, s.position[i]), std::max(out[i].high, s.position[i])};
+  }
+  return out;
+}
+
+bool same_values(const std::vector<LegSample>& legs, std::size_t a, std::size_t b) {
+  return std::ranges::all_of(legs, [&](const LegSample& s) { return s.position[a] == s.position[b]; });
+}
+
+}  // namespace
+
+// False when the legs cannot be judged with these values.
+bool Examination::examine_joint_values() {
+  const std::vector<std::size_t> joints = recorded_legs_.joints_that_matter(robot_);
+  const std::vector<Range> ranges = ranges_of(recorded_.legs);
+  const std::vector<std::string>& names = recorded_.joint_names;
+  std::string frozen, repeated;
+  const auto add = [](std::string& to, const std::string& text) { to += (to.empty() ? "" : ", ") + text; };
+  for (const std::size_t i : joints) {
+    const auto twin = std::ranges::find(names, other_side(names[i])) - names.begin();
+    const auto j = static_cast<std::size_t>(twin);
+    if (j == names.size() || j == i) continue;
+    // The same joint of the other leg walks.
+    if (ranges[i].size() < at_rest && ranges[j].size() > turns) add(frozen, names[i]);
+    if (i < j && ranges[i].size() > turns && same_values(recorded_.legs, i, j)) add(repeated, names[i] + " and " + names[j]);
+  }
+  const std::string driver = "the driver must publish each position under its own joint's name";
+  if (!frozen.empty()) {
+    find({Sensor::legs,
+          "joint_frozen",
+          fmt::format("the positions of {} never change", frozen),
+          "the same joint of the other leg turns",
+          driver,
+          0,
+          "",
+          {},
+          true});
+  }
+  if (!repeated.empty()) {
+    find({Sensor::legs,
+          "joints_repeated",
+          fmt::format("the positions are the same in both legs: {}", repeated),
+          fmt::format("all {} samples", recorded_.legs.size()),
+          driver,
+          0,
+          "",
+          {},
+          true});
+  }
+  return frozen.empty() && repeated.empty();
+}
+
+}  // namespace kilvo::lab
