@@ -180,7 +180,7 @@ def description_cases(config, folder, work):
         half = os.path.join(work, "half.urdf")
         open(half, "w").write(re.sub(r'(<origin[^>]*xyz=")([^"]+)"', lambda m: m.group(1) + " ".join(f"{0.5 * float(x):.9g}" for x in m.group(2).split()) + '"', text))
         out.append(("URDF of half the size", ["robot.urdf=" + half], ["leg_lengths", "urdf"]))
-        if "waist" in text:
+        if re.search('name="waist[^"]*" type="revolute"', text) and "waist" not in str(config["robot"].get("locked_joints", "")):
             waist = os.path.join(work, "waist.urdf")
             open(waist, "w").write(re.sub(r'(<joint name="waist[^"]*".*?<axis xyz=")([^"]+)(")', lambda m: m.group(1) + " ".join(str(-float(x)) for x in m.group(2).split()) + m.group(3), text, count=1, flags=re.S))
             out.append(("waist's sign", ["robot.urdf=" + waist], ["joint_sign"]))

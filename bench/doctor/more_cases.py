@@ -40,9 +40,9 @@ def mount_cases(config, texts, pose, rotation):
     key = "lidar.T_imu_lidar"
     if differ(other_order(R), R):
         out.append(("LiDAR's quaternion in another order", texts(key, other_order(R)), ["lidar_rotation"]))
-    out.append(("LiDAR of the robot with the tilted mount", texts(key, R @ rotation("y", 22), p + [0.01, 0, 0.11]), ["lidar_rotation"]))
+    out.append(("LiDAR of the robot with the tilted mount", texts(key, R @ rotation("y", 22), p + [0.01, 0, 0.11]), ["lidar_rotation", "lidar_position"]))
     out.append(("LiDAR described upright", texts(key, R @ UPSIDE_DOWN), ["lidar_rotation"]))
-    out.append(("LiDAR's place with y negated", texts(key, p=p * [1, -1, 1] + [0, 0.03 if abs(p[1]) < 0.03 else 0, 0]), []))
+    out.append(("LiDAR's place with y negated", texts(key, p=p * [1, -1, 1] + [0, 0.03 if abs(p[1]) < 0.03 else 0, 0]), ["lidar_position"]))
     for ms in (-50, 8):
         out.append((f"LiDAR's time_offset {ms} ms", [f"lidar.time_offset={ms / 1000}"], ["lidar_clock"]))
     return out
@@ -170,8 +170,8 @@ def data_cases(config, each_imu, each_legs, rotation):
         out += [("LiDAR's x and y swapped", points_by(swap), ["lidar_axes"]), ("points in centimetres", points_by(100 * np.eye(3)), ["lidar_unit"]),
                 ("points in millimetres", points_by(1000 * np.eye(3)), ["lidar_unit"]), ("points 5 % too far", points_by(1.05 * np.eye(3)), ["lidar_unit"])]
     if "legs" in config:
-        out += [("one leg in both", each_legs(one_leg_twice), ["joints_swapped", "joints_exchanged", "urdf"]),
+        out += [("one leg in both", each_legs(one_leg_twice), ["joints_repeated"]),
                 ("right leg's rolls and yaws negated", each_legs(right_leg_mirrored), ["joint_sign"]),
-                ("joint speeds in rpm", each_legs(speed_in_rpm), ["joint_unit"]),
-                ("a knee that shows its first angle", each_legs(frozen("left_knee_joint")), ["joint_offset", "joint_frozen"])]
+                ("joint speeds in rpm", each_legs(speed_in_rpm), ["joint_unit", "joint_velocity"]),
+                ("a knee that shows its first angle", each_legs(frozen("left_knee_joint")), ["joint_frozen"])]
     return out

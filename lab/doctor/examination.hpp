@@ -128,18 +128,20 @@ class Examination {
   bool accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const;
   void examine_leg_shape();
   void examine_joint_speeds();
-  // leg_mount.cpp
+  // leg_mount.cpp, leg_zeros.cpp
   MountFit measure_leg_mount() const;
   void examine_leg_rotation();
   void examine_leg_clock(const MountFit& fit, double method, double tolerance);
   bool turns_with_link(const LegHypothesis& other) const;
   void refine_zeros(const StanceFit& stances);
+  void examine_feet_apart(const Robot& start);
   bool find_wrong_zero(const StanceFit& stances, const Robot& start);
   void settle_imu_link(const SO3& measured);
   struct LegWay {
     double scale = 1, sigma = 0;  // way by the legs through way by the LiDAR
     std::size_t windows = 0;
     std::optional<double> height;  // m, of the LiDAR: by the legs less by its points
+    std::optional<double> uneven;  // m: how much lower the left sole is than the right one where the robot stands
   };
   LegWay measure_leg_way(const LegHypothesis* hypothesis) const;
   bool accuse_exchanged_legs(double scale, const std::string& evidence);
@@ -147,6 +149,8 @@ class Examination {
   bool lidar_is_too_large(double scale, const std::string& evidence);
   void accuse_leg_lengths(double scale, double height);
   void accuse_imu_place(double height);
+  void accuse_uneven_legs(double uneven);
+  std::optional<double> soles_above_ankles() const;
   std::string link_at_height(double height) const;
   // camera_examination.cpp
   void examine_camera();

@@ -87,8 +87,32 @@ std::string Examination::link_at_height(double height) const {
   return "";
 }
 
+// How far both soles are above the origins of their links, if they are: the sign of their height is wrong.
+std::optional<double> Examination::soles_above_ankles() const {
+  const std::vector<LegPose> path = legs_under(nullptr, 1);
+  if (path.empty()) return std::nullopt;
+  constexpr double clearly = 0.01;  // m
+  double above = INFINITY;
+  for (std::size_t f = 0; f < 2; ++f) {
+    const auto& sole = robot_.feet[f].sole;
+    if (sole.empty()) return std::nullopt;
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& corner : sole) middle += corner / static_cast<double>(sole.size());
+    above = std::min(above, up_by_legs().normalized().dot(path.front().foot[f].R_IF * middle));
+  }
+  return above > clearly ? std::optional(above) : std::nullopt;
+}
+
 void Examination::accuse_imu_place(double height) {
   Finding f{Sensor::imu, "imu_mount_position", {}, {}, {}, height, fmt::format("m"), {}, true};
+  if (const auto above = soles_above_ankles()) {
+    f.sensor = Sensor::legs;
+    f.cause = "sole_height";
+    f.text = fmt::format("the soles are {:.1f} cm above the origins of their links", 100 * *above);
+    f.remedy = "robot.feet: sole: the sign of the heights of its corners";
+    find(std::move(f));
+    return;
+  }
   f.text = fmt::format("the IMU sits {:.1f} cm {} on the robot than described", 100 * std::abs(height), height > 0 ? "lower" : "higher");
   f.remedy = "imu.T_link_imu.p, or its link";
   if (const std::string link = link_at_height(height); !link.empty()) {

@@ -21,9 +21,9 @@ struct Lowest {
   double height = 1e9;
 };
 
-Lowest lowest_of(const LegPose& pose, const Eigen::Vector3d& up_link) {
+Lowest lowest_of(const LegPose& pose, const Eigen::Vector3d& up_link, std::size_t first_foot = 0, std::size_t last_foot = 1) {
   Lowest out;
-  for (std::size_t f = 0; f < 2; ++f) {
+  for (std::size_t f = first_foot; f <= last_foot; ++f) {
     for (int i = 0; i < pose.foot[f].corners; ++i) {
       const double height = up_link.dot(pose.foot[f].p[static_cast<std::size_t>(i)]);
       if (height < out.height) out = {f, static_cast<std::size_t>(i), height};
@@ -82,6 +82,7 @@ class WayOfLegs {
       if (heights_.empty()) still_from_ = t;
       still_until_ = t;
       heights_.push_back(up.dot(p_link_lidar_) - lowest_of(pose, up).height);
+      uneven_.push_back(lowest_of(pose, up, 1, 1).height - lowest_of(pose, up, 0, 0).height);
     }
     if (last_ && t - last_t_ < 0.05) {
       const Lowest stands = lowest_of(last_pose_, last_->R.inverse() * up_W_);
@@ -110,15 +111,18 @@ class WayOfLegs {
   }
   std::size_t windows() const { return ratios_.size(); }
   /// From the lowest corner up to the LiDAR while the robot stands at the beginning.
-  std::optional<double> height() const {
-    if (heights_.size() < 50 || still_until_ - still_from_ < 0.8) return std::nullopt;
-    std::vector<double> sorted = heights_;
-    std::ranges::sort(sorted);
-    return sorted[sorted.size() / 2];
-  }
+  std::optional<double> height() const { return median_of(heights_); }
+  /// How much lower the left sole is then.
+  std::optional<double> uneven() const { return median_of(uneven_); }
   double still_until() const { return still_until_; }
 
  private:
+  std::optional<double> median_of(std::vector<double> values) const {
+    if (values.size() < 50 || still_until_ - still_from_ < 0.8) return std::nullopt;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::ranges::nth_element(values, middle);
+    return *middle;
+  }
   Eigen::Vector3d flat(const Eigen::Vector3d& v) const { return v - up_W_ * up_W_.dot(v); }
   void begin(double t, const SE3& T_W) {
     begin_ = t;
@@ -132,7 +136,7 @@ class WayOfLegs {
   double last_t_ = -1, begin_ = 0, still_from_ = 0, still_until_ = -1;
   Eigen::Vector3d by_legs_ = Eigen::Vector3d::Zero(), from_ = Eigen::Vector3d::Zero();
   bool still_ = true;
-  std::vector<double> ratios_, heights_;
+  std::vector<double> ratios_, heights_, uneven_;
 };
 
 std::string detail_of(double scale, double sigma, std::size_t windows, const std::optional<double>& height) {
@@ -160,6 +164,7 @@ Examination::LegWay Examination::measure_leg_way(const LegHypothesis* hypothesis
   LegWay out;
   std::tie(out.scale, out.sigma) = way.scale();
   out.windows = way.windows();
+  out.uneven = way.uneven();
   if (const auto by_legs = way.height()) {
     if (const auto by_points = height_by_lidar(recorded_.sweeps, way_, up_W, way.still_until())) out.height = *by_legs - *by_points;
   }
@@ -193,9 +198,14 @@ void Examination::examine_leg_lengths() {
     return;
   }
   const LegWay way = measure_leg_way(nullptr);
-  const auto& [by_way, sigma, windows, height] = way;
+  const auto& [by_way, sigma, windows, height, uneven] = way;
   // The feet that stand tell it better than the way over soles that roll; a place of the IMU that is wrong would spoil that, and show as a
   // height that these legs do not explain.
+  constexpr double floor_is_even = 0.025;  // m
+  if (uneven && std::abs(*uneven) > floor_is_even) {
+    accuse_uneven_legs(*uneven);
+    return;
+  }
   double scale = by_way;
   const double legs = legs_under(nullptr).front().foot[0].p[0].norm();
   const auto explains = [&](double s) {

@@ -5,7 +5,6 @@
 #include <functional>
 
 #include "lab/doctor/examination.hpp"
-#include "lab/doctor/leg_hypotheses.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -122,7 +121,10 @@ void Examination::examine_leg_rotation() {
   mount.changes = {{"imu.T_link_imu.R", rotation_text(turned_by(described, mount).inverse())}};
   for (auto* x : {&mount.change, &mount.taken}) std::ranges::transform(*x, x->begin(), std::negate());  // of the mount, not of its inverse
   if (!recorded_.leg_clock_is_found) refine_offset(Sensor::legs, fit.offset, fit.offset_sigma(), clock_method);
-  if (stances.good) refine_zeros(stances);
+  if (stances.good) {
+    refine_zeros(stances);
+    examine_feet_apart(start);
+  }
   const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
   const double angle = degrees(turn.norm()), uncertain = std::hypot(degrees(fit.rotation_sigma().norm()), method);
   const std::string detail = fmt::format("{:.1f} degrees from the description, standard deviation {:.1f}; {:.0f} % explained", angle,
@@ -153,56 +155,6 @@ void Examination::examine_leg_clock(const MountFit& fit, double method, double t
   } else {
     find_offset(Sensor::legs, fit.offset, sigma, "the legs against the gyro");
   }
-}
-
-// A zero that is far off bends all that the fit finds towards it: the one joint with which the soles stand much better, when its zero may
-// be anything.
-bool Examination::find_wrong_zero(const StanceFit& stances, const Robot& start) {
-  constexpr double suspicious = 0.8, least = 4;  // degrees
-  constexpr double much_better = 0.88;           // of how far standing feet seem to move
-  if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "joint_offset"; })) return false;
-  if (std::ranges::none_of(stances.zero, [](double zero) { return std::abs(degrees(zero)) > suspicious; })) return false;
-  std::optional<std::size_t> joint;
-  StanceFit best = stances;
-  for (std::size_t i = 0; i < stances.joints.size(); ++i) {
-    StanceFit free = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, lidar_way(), gyro(), stances.offset, i);
-    const double size = std::abs(free.good ? free.zero[i] : 0);
-    if (degrees(size) < least || size < sure_among(stances.joints.size()) * free.zero_sigma[i]) continue;
-    if (free.moved > std::min(best.moved, much_better * stances.moved)) continue;
-    best = std::move(free);
-    joint = i;
-  }
-  if (!joint) return false;
-  const std::string& name = stances.joints[*joint];
-  const double zero = best.zero[*joint];
-  LegHypothesis mend;
-  mend.position = [place = std::ranges::find(recorded_.joint_names, name) - recorded_.joint_names.begin(), zero](std::size_t i, double& q) {
-    if (static_cast<std::ptrdiff_t>(i) == place) q += zero;
-  };
-  find({Sensor::legs,
-        "joint_offset",
-        fmt::format("the zero of joint {} is off by {:.0f} degrees", name, -degrees(zero)),
-        fmt::format("soles that stand move by {:.2f} mm then, by {:.2f} as described; {:.1f} degrees, standard deviation {:.1f}",
-                    1e3 * best.moved, 1e3 * stances.moved, -degrees(zero), degrees(best.zero_sigma[*joint])),
-        fmt::format("the zero of joint {} in the driver, or its origin in robot.urdf", name),
-        -degrees(zero),
-        "deg",
-        {},
-        true});
-  leg_mend_ = leg_mend_ ? joined(*leg_mend_, mend) : mend;
-  return true;
-}
-
-// A zero that is wrong in both legs alike is a turn of the IMU, and counted as one: its standard deviation says so.
-void Examination::refine_zeros(const StanceFit& stances) {
-  stances_ = stances;
-  constexpr double method = 0.25, largest = 0.5, scale_method = 0.002, largest_scale = 0.005;  // degrees, -
-  for (std::size_t i = 0; i < stances.joints.size(); ++i) {
-    refinements_.push_back(refinement(Sensor::legs, "zero of " + stances.joints[i], {degrees(stances.zero[i])},
-                                      {degrees(stances.zero_sigma[i])}, method, largest, fmt::format("deg")));
-  }
-  refinements_.push_back(refinement(Sensor::legs, fmt::format("scale of the legs"), {stances.scale - 1}, {stances.scale_sigma},
-                                    scale_method, largest_scale, fmt::format("-")));
 }
 
 }  // namespace kilvo::lab

@@ -8,12 +8,13 @@ namespace {
 constexpr std::size_t fewest_stances = 24;  // stances
 // What a careful description leaves: of positions, zeros of encoders and lengths.
 constexpr double prior_p = 0.01, prior_zero = 0.004, prior_scale = 0.005;  // m, rad, -
+constexpr double fixed = 1e-9;                                             // m
 constexpr int passes = 3;
 
 }  // namespace
 
 StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
-                      double offset, std::optional<std::size_t> free_joint) {
+                      double offset, const StanceFreedom& free) {
   StanceFit out;
   Stances stances(legs, robot, hypothesis, way, gyro, offset, true);
   const Eigen::Index n = stances.unknowns();
@@ -22,7 +23,8 @@ StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesi
   prior.segment<3>(Stances::of_p).setConstant(prior_p);
   prior[Stances::of_offset] = INFINITY;
   prior[Stances::of_scale] = prior_scale;
-  if (free_joint) prior[Stances::of_zeros + static_cast<Eigen::Index>(*free_joint)] = INFINITY;
+  prior.segment<3>(Stances::of_apart).setConstant(free.apart ? INFINITY : fixed);
+  if (free.joint) prior[Stances::of_zeros + static_cast<Eigen::Index>(*free.joint)] = INFINITY;
   step.setConstant(1e-4);
   step[Stances::of_offset] = Stances::clock_step;
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(n);
@@ -43,6 +45,8 @@ StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesi
   out.offset_sigma = fit.sigma(Stances::of_offset);
   out.scale = 1 + x[Stances::of_scale];
   out.scale_sigma = fit.sigma(Stances::of_scale);
+  out.apart = x.segment<3>(Stances::of_apart);
+  for (int i = 0; i < 3; ++i) out.apart_sigma[i] = fit.sigma(static_cast<int>(Stances::of_apart) + i);
   for (std::size_t j = 0; j < stances.joints().size(); ++j) {
     const auto i = Stances::of_zeros + static_cast<Eigen::Index>(j);
     out.joints.push_back(legs.recorded().joint_names[stances.joints()[j]]);

@@ -20,16 +20,23 @@ struct StanceFit {
   Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();  // rad, in the link's frame
   double offset = 0, offset_sigma = 0;                       // s: the legs' stamps plus this are on the IMU's clock
   double scale = 1, scale_sigma = 0;                         // of the legs' lengths
-  std::vector<std::string> joints;                           // those that move a foot
-  std::vector<double> zero, zero_sigma;                      // rad, by joint: to be added to its position
-  double moved = 0;                                          // m: how far a standing foot seems to move, robust standard deviation
+  Eigen::Vector3d apart = Eigen::Vector3d::Zero(),
+                  apart_sigma = apart;   // m, link's frame: of the left foot; the right one's is its negative
+  std::vector<std::string> joints;       // those that move a foot
+  std::vector<double> zero, zero_sigma;  // rad, by joint: to be added to its position
+  double moved = 0;                      // m: how far a standing foot seems to move, robust standard deviation
   std::size_t stances = 0;
 };
 
-/// `hypothesis`: of the legs, may be null. Starts from robot.imu.T_link_imu and `offset`. `free_joint`, of `joints`: its zero may be
-/// anything.
+/// What a fit may change beyond what a careful description is off by: nothing, a joint's zero (of `StanceFit::joints`), where the feet are.
+struct StanceFreedom {
+  std::optional<std::size_t> joint;
+  bool apart = false;
+};
+
+/// `hypothesis`: of the legs, may be null. Starts from robot.imu.T_link_imu and `offset`.
 StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
-                      double offset, std::optional<std::size_t> free_joint = std::nullopt);
+                      double offset, const StanceFreedom& free = {});
 
 struct Standing {
   std::array<double, 2> of{};  // s, by foot, in which its sole stands while the robot moves

@@ -20,7 +20,7 @@ class Stances {
   // m, rad: of the rows. A sole tilts with the load on it by a tenth of a degree, in step with the gait, while its middle stays where it
   // is.
   static constexpr double unit_p = 0.003, unit_R = 0.03;
-  static constexpr Eigen::Index of_p = 3, of_offset = 6, of_scale = 7, of_zeros = 8;
+  static constexpr Eigen::Index of_p = 3, of_offset = 6, of_scale = 7, of_apart = 8, of_zeros = 11;
 
   Stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro, double offset,
           bool with_zeros)
@@ -179,6 +179,9 @@ class Stances {
     std::size_t foot = 0, begin = 0, end = 0;  // samples
   };
 
+  // The feet are `apart` from where they are described, the left one by it, the right one by its negative.
+  static double side(std::size_t f) { return f == 0 ? 1 : -1; }
+
   static Eigen::Vector3d middle_of(const FootPose& foot) {
     Eigen::Vector3d out = Eigen::Vector3d::Zero();
     for (int i = 0; i < foot.corners; ++i) out += foot.p[static_cast<std::size_t>(i)] / foot.corners;
@@ -229,7 +232,8 @@ class Stances {
     const Sole& sole = samples_[i].sole[f];
     if (joints_.empty()) return *T_WI * T_IL_ * SE3{sole.R, (1 + x[of_scale]) * sole.c};
     const auto zeros = x.tail(x.size() - of_zeros);
-    const SE3 in_link{sole.R * SO3::Exp(sole.by_R * zeros), (1 + x[of_scale]) * (sole.c + sole.by_c * zeros)};
+    const SE3 in_link{sole.R * SO3::Exp(sole.by_R * zeros),
+                      (1 + x[of_scale]) * (sole.c + sole.by_c * zeros) + side(f) * x.segment<3>(of_apart)};
     return *T_WI * T_IL_ * in_link;
   }
 
@@ -248,7 +252,7 @@ class Stances {
     const auto zeros = x.tail(x.size() - of_zeros);
     const double scale = 1 + x[of_scale];
     const Eigen::Matrix3d R_WL = (T_WI_[i]->R * T_IL_.R).matrix(), R_FL = T_WF.R.matrix().transpose() * R_WL;
-    const Eigen::Vector3d c = sole.c + sole.by_c * zeros, from_imu = scale * c - T_IL_.inverse().p;
+    const Eigen::Vector3d c = sole.c + sole.by_c * zeros, from_imu = scale * c + side(f) * x.segment<3>(of_apart) - T_IL_.inverse().p;
     const Eigen::Matrix3d left = right_jacobian(-x.head<3>());
     out.topLeftCorner<3, 3>() = R_WL * skew(from_imu) * left;
     out.bottomLeftCorner<3, 3>() = -R_FL * left;
@@ -258,6 +262,7 @@ class Stances {
       out.col(of_offset) << (moved.p - T_WF.p) / clock_step, (T_WF.R.inverse() * moved.R).Log() / clock_step;
     }
     out.col(of_scale).head<3>() = R_WL * c;
+    out.block<3, 3>(0, of_apart) = side(f) * R_WL;
     out.topRightCorner(3, zeros.size()) = scale * R_WL * sole.by_c;
     out.bottomRightCorner(3, zeros.size()) = right_jacobian(sole.by_R * zeros) * sole.by_R;
     return out;

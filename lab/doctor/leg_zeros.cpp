@@ -1,0 +1,98 @@
+// What the stances show of the legs themselves: zeros of the joints, where the feet are; legs of two lengths.
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+
+#include "lab/doctor/examination.hpp"
+#include "lab/doctor/leg_hypotheses.hpp"
+
+namespace kilvo::lab {
+
+// A zero that is far off bends all that the fit finds towards it: the one joint with which the soles stand much better, when its zero may
+// be anything.
+bool Examination::find_wrong_zero(const StanceFit& stances, const Robot& start) {
+  constexpr double suspicious = 0.8, least = 4;  // degrees
+  constexpr double much_better = 0.88;           // of how far standing feet seem to move
+  if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "joint_offset"; })) return false;
+  if (std::ranges::none_of(stances.zero, [](double zero) { return std::abs(degrees(zero)) > suspicious; })) return false;
+  std::optional<std::size_t> joint;
+  StanceFit best = stances;
+  for (std::size_t i = 0; i < stances.joints.size(); ++i) {
+    StanceFit free = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, lidar_way(), gyro(), stances.offset, {i, false});
+    const double size = std::abs(free.good ? free.zero[i] : 0);
+    if (degrees(size) < least || size < sure_among(stances.joints.size()) * free.zero_sigma[i]) continue;
+    if (free.moved > std::min(best.moved, much_better * stances.moved)) continue;
+    best = std::move(free);
+    joint = i;
+  }
+  if (!joint) return false;
+  const std::string& name = stances.joints[*joint];
+  const double zero = best.zero[*joint];
+  LegHypothesis mend;
+  mend.position = [place = std::ranges::find(recorded_.joint_names, name) - recorded_.joint_names.begin(), zero](std::size_t i, double& q) {
+    if (static_cast<std::ptrdiff_t>(i) == place) q += zero;
+  };
+  find({Sensor::legs,
+        "joint_offset",
+        fmt::format("the zero of joint {} is off by {:.0f} degrees", name, -degrees(zero)),
+        fmt::format("soles that stand move by {:.2f} mm then, by {:.2f} as described; {:.1f} degrees, standard deviation {:.1f}",
+                    1e3 * best.moved, 1e3 * stances.moved, -degrees(zero), degrees(best.zero_sigma[*joint])),
+        fmt::format("the zero of joint {} in the driver, or its origin in robot.urdf", name),
+        -degrees(zero),
+        "deg",
+        {},
+        true});
+  leg_mend_ = leg_mend_ ? joined(*leg_mend_, mend) : mend;
+  return true;
+}
+
+// Hips of another width: the feet are farther from or nearer to each other than described, which shows when the robot turns over them.
+void Examination::examine_feet_apart(const Robot& start) {
+  constexpr double tolerance = 0.035;  // m; careful descriptions of rough robots seem off by 2.5 cm
+  const StanceFit fit =
+      fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, lidar_way(), gyro(), leg_offset_, {std::nullopt, true});
+  Eigen::Index axis = 0;
+  if (!fit.good || fit.apart.cwiseAbs().maxCoeff(&axis) < std::max(tolerance, sure_among(3) * fit.apart_sigma[axis])) return;
+  const std::vector<LegPose> path = legs_under(nullptr, 1);
+  if (path.empty()) return;
+  const Eigen::Vector3d described = path.front().foot[0].p[0] - path.front().foot[1].p[0];
+  const double farther = std::copysign(2 * fit.apart[axis], fit.apart[axis] * described[axis]);
+  find({Sensor::legs,
+        "leg_lengths",
+        fmt::format("the feet are {:.0f} cm {} each other along the link's {} than the URDF says", 100 * std::abs(farther),
+                    farther > 0 ? "farther from" : "nearer to", "xyz"[axis]),
+        fmt::format("soles that stand move by {:.2f} mm then; each foot is {:.1f} cm off, standard deviation {:.1f}", 1e3 * fit.moved,
+                    100 * fit.apart[axis], 100 * fit.apart_sigma[axis]),
+        "robot.urdf: the origins of the hips, or the URDF of this robot",
+        farther,
+        "m",
+        {},
+        true});
+}
+
+void Examination::accuse_uneven_legs(double uneven) {
+  const std::string longer = uneven > 0 ? "left" : "right", shorter = uneven > 0 ? "right" : "left";
+  find({Sensor::legs,
+        "leg_lengths",
+        fmt::format("the {} leg of the URDF is too long, or the {} one too short, by {:.1f} cm", longer, shorter, 100 * std::abs(uneven)),
+        fmt::format("where the robot stands the {} sole is {:.1f} cm lower than the other", longer, 100 * std::abs(uneven)),
+        "robot.urdf: the lengths of thigh and shin of both legs, or the zeros of the joints",
+        uneven,
+        "m",
+        {},
+        true});
+}
+
+// A zero that is wrong in both legs alike is a turn of the IMU, and counted as one: its standard deviation says so.
+void Examination::refine_zeros(const StanceFit& stances) {
+  stances_ = stances;
+  constexpr double method = 0.25, largest = 0.5, scale_method = 0.002, largest_scale = 0.005;  // degrees, -
+  for (std::size_t i = 0; i < stances.joints.size(); ++i) {
+    refinements_.push_back(refinement(Sensor::legs, "zero of " + stances.joints[i], {degrees(stances.zero[i])},
+                                      {degrees(stances.zero_sigma[i])}, method, largest, fmt::format("deg")));
+  }
+  refinements_.push_back(refinement(Sensor::legs, fmt::format("scale of the legs"), {stances.scale - 1}, {stances.scale_sigma},
+                                    scale_method, largest_scale, fmt::format("-")));
+}
+
+}  // namespace kilvo::lab
