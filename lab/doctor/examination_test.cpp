@@ -132,6 +132,27 @@ TEST(Doctor, TheImuIsNamedWhenAllOthersDisagreeWithIt) {
   EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("gyro_unit"));
 }
 
+TEST(Doctor, AGyroThatIsATenthTooFastIsNamed) {
+  for (const double factor : {1.1, 0.9}) {
+    Recorded recorded = walked().recorded;
+    for (InertialSample& s : recorded.imu) s.gyro *= factor;
+    EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("gyro_unit")) << factor;
+  }
+}
+
+TEST(Doctor, PointsOfAnotherUnitAreNamed) {
+  for (const float factor : {3.28F, 100.0F}) {
+    Recorder recorder;
+    for (Measurement measurement : walked().measurements) {
+      if (auto* scan = std::get_if<LidarScan>(&measurement)) {
+        for (LidarPoint& p : scan->points) p.x *= factor, p.y *= factor, p.z *= factor;
+      }
+      recorder.push(measurement);
+    }
+    EXPECT_THAT(causes(recorder.finish(), walked().robot), ElementsAre("lidar_unit")) << factor;
+  }
+}
+
 // As the sweeps of a runner make it seem for some seconds.
 TEST(Doctor, AGyroWhoseScaleIsRightForHalfOfTheTurningIsNotAccused) {
   Recorded recorded = walked().recorded;
@@ -159,6 +180,44 @@ TEST(Doctor, LegsAreNamedWithTheJoint) {
   Robot robot = walked().robot;
   std::swap(robot.feet[0].link, robot.feet[1].link);
   EXPECT_THAT(causes(walked().recorded, robot), ElementsAre("feet_swapped"));
+}
+
+std::size_t place_of(const std::string& joint) {
+  const std::vector<std::string>& names = walked().recorded.joint_names;
+  return static_cast<std::size_t>(std::ranges::find(names, joint) - names.begin());
+}
+
+TEST(Doctor, ALegThatIsMirroredIsNamed) {
+  Recorded recorded = walked().recorded;
+  for (LegSample& s : recorded.legs) {
+    for (const char* joint : {"right_hip_roll_joint", "right_hip_yaw_joint", "right_ankle_roll_joint"})
+      s.position.at(place_of(joint)) *= -1;
+  }
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("joint_sign"));
+}
+
+TEST(Doctor, JointsThatNeverChangeOrRepeatTheOtherLegAreNamed) {
+  const std::size_t left = place_of("left_knee_joint"), right = place_of("right_knee_joint");
+  Recorded frozen = walked().recorded;
+  for (LegSample& s : frozen.legs) s.position.at(left) = frozen.legs.front().position.at(left);
+  EXPECT_THAT(causes(frozen, walked().robot), ElementsAre("joint_frozen"));
+  Recorded repeated = walked().recorded;
+  for (LegSample& s : repeated.legs) s.position.at(left) = s.position.at(right);
+  EXPECT_THAT(causes(repeated, walked().robot), ElementsAre("joints_repeated"));
+}
+
+TEST(Doctor, SolesAboveTheirLinksAreNamed) {
+  Robot robot = walked().robot;
+  for (auto& foot : robot.feet) {
+    for (Eigen::Vector3d& corner : foot.sole) corner.z() *= -1;
+  }
+  EXPECT_THAT(causes(walked().recorded, robot), ElementsAre("sole_height"));
+}
+
+TEST(Doctor, LegsOfTwoLengthsAreNamed) {
+  Robot robot = walked().robot;
+  for (Eigen::Vector3d& corner : robot.feet[0].sole) corner.z() -= 0.04;
+  EXPECT_THAT(causes(walked().recorded, robot), ElementsAre("leg_lengths"));
 }
 
 TEST(Doctor, PointsThatAreMirroredAreNoTurnedMount) {

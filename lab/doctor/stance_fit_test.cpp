@@ -105,6 +105,33 @@ TEST_F(StancesOfAWalk, TellTheMountAndTheClock) {
   EXPECT_NEAR(fit.offset, -0.006, 0.0008);
 }
 
+TEST_F(StancesOfAWalk, TellAZeroThatIsFarOffWhereItIsFree) {
+  Recorded bent = recorded_;
+  const auto knee = static_cast<std::size_t>(std::ranges::find(bent.joint_names, "right_knee_joint") - bent.joint_names.begin());
+  ASSERT_LT(knee, bent.joint_names.size());
+  for (LegSample& s : bent.legs) s.position[knee] += 0.2;
+  RecordedLegs legs(bent);
+  const StanceFit described = fit_stances(legs, robot_, nullptr, way_, gyro_, 0);
+  ASSERT_TRUE(described.good);
+  const auto joint = static_cast<std::size_t>(std::ranges::find(described.joints, "right_knee_joint") - described.joints.begin());
+  const StanceFit free = fit_stances(legs, robot_, nullptr, way_, gyro_, 0, {joint, false});
+  ASSERT_TRUE(free.good);
+  EXPECT_NEAR(free.zero[joint], -0.2, 0.03);
+  EXPECT_LT(free.moved, 0.88 * described.moved);
+}
+
+TEST_F(StancesOfAWalk, TellThatTheFeetAreFartherApart) {
+  Robot wide = robot_;
+  auto shape = config().shape;
+  shape.hip.y() += 0.05;
+  wide.urdf = urdf_of(shape);
+  RecordedLegs legs(recorded_);
+  const StanceFit fit = fit_stances(legs, wide, nullptr, way_, gyro_, 0, {std::nullopt, true});
+  ASSERT_TRUE(fit.good);
+  EXPECT_NEAR(fit.apart.y(), -0.05, 0.01);
+  EXPECT_LT(std::hypot(fit.apart.x(), fit.apart.z()), 0.015);
+}
+
 // Each column of the derivative against central differences, away from where the unknowns are zero. The clock's follows the way between
 // the IMU's samples, of which a difference sees two.
 TEST_F(StancesOfAWalk, HaveTheDerivativesThatTheirDifferencesShow) {
