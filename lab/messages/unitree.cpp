@@ -44,6 +44,19 @@ std::optional<std::span<const std::size_t>> empty_places(const HgLowStateMessage
   }
 }
 
+// Those of a robot with these places empty; made once.
+JointNames names_without(std::span<const std::size_t> empty) {
+  const auto make = [](std::span<const std::size_t> lacking) {
+    JointNames::List names;
+    for (std::size_t i = 0; i < g1_joints.size(); ++i) {
+      if (std::ranges::find(lacking, i) == lacking.end()) names.emplace_back(g1_joints[i]);
+    }
+    return JointNames(std::move(names));
+  };
+  static const std::array names{make({}), make(locked_waist), make(lacking_of_23)};
+  return names.at(empty.empty() ? 0 : empty.size() == locked_waist.size() ? 1 : 2);
+}
+
 Decoded<JointSample> joints_of(const HgLowStateMessage& m) {
   if (m.mode_pr != 0)
     return DecodeError{"unitree_hg/LowState: mode_pr is " + std::to_string(m.mode_pr) +
@@ -54,18 +67,15 @@ Decoded<JointSample> joints_of(const HgLowStateMessage& m) {
                        " is no robot whose order of joints is known (G1: 1 to 6)"};
   JointSample joints;
   joints.t = time_from_ns(std::int64_t{m.tick} * 1'000'000);
-  JointNames::List names;
-  names.reserve(g1_joints.size());
-  for (std::vector<double>* values : {&joints.position, &joints.velocity, &joints.effort}) values->reserve(g1_joints.size());
+  joints.names = names_without(*empty);
+  for (std::vector<double>* values : {&joints.position, &joints.velocity, &joints.effort}) values->reserve(joints.names.size());
   for (std::size_t i = 0; i < g1_joints.size(); ++i) {
     if (std::ranges::find(*empty, i) != empty->end()) continue;
     const HgMotorMessage& motor = m.motor_state[i];
-    names.emplace_back(g1_joints[i]);
     joints.position.push_back(static_cast<double>(motor.q));
     joints.velocity.push_back(static_cast<double>(motor.dq));
     joints.effort.push_back(static_cast<double>(motor.tau_est));
   }
-  joints.names = std::move(names);
   return joints;
 }
 
