@@ -132,6 +132,11 @@ bool Examination::try_camera_hypotheses(const CameraTracks& tracks) {
   // How well it can be: small turns, focal length and clock are for the fit.
   std::vector<double> offsets = tracks.likely_offsets(1.3);
   offsets.insert(offsets.begin(), 0);
+  // Where places move the image as much as turns do, its motion may not tell: some images late are tried one by one.
+  constexpr double bad = 1, farthest = 0.3, step = 0.02;  // px, s
+  if (described > bad) {
+    for (int k = 1; k * step <= farthest; ++k) offsets.insert(offsets.end(), {k * step, -k * step});
+  }
   double best = much_better_images * described;
   const CameraHypothesis* which = nullptr;
   const CameraFit refined = tracks.fit({robot_.camera, 0}, true, true);

@@ -133,9 +133,12 @@ std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot&
   all.setting = "the axes of the joints in robot.urdf, or their signs in the driver";
   all.position = [](std::size_t, double& q) { q = -q; };
   out.push_back(all);
+  const bool sided = std::ranges::any_of(joints, [&](std::size_t i) { return has_side(names[i]); });
   for (LegHypothesis& h : sign_hypotheses(joints, names)) out.push_back(std::move(h));
   for (std::size_t k = 0; k < joints.size(); ++k) {
     const std::size_t i = joints[k];
+    // A joint that both legs hang on turns them as the IMU's mount does.
+    if (sided && !has_side(names[i])) continue;
     for (const double turn : {90.0, -90.0, 180.0}) {
       LegHypothesis h;
       h.cause = "joint_offset";

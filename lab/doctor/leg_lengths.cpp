@@ -266,6 +266,11 @@ bool Examination::lidar_is_too_large(double scale, const std::string& evidence) 
 }
 
 void Examination::accuse_leg_lengths(double scale, double height) {
+  // The stances show mount and clock with legs of these lengths only.
+  constexpr double by_lengths = 5, clock_by_lengths = 0.01;  // degrees, s
+  std::erase_if(diagnosis_.findings, [](const Finding& f) {
+    return (f.cause == "imu_mount_rotation" && f.size < by_lengths) || (f.cause == "legs_clock" && std::abs(f.size) < clock_by_lengths);
+  });
   Finding f{Sensor::legs, "leg_lengths", {}, {}, {}, scale - 1, {}, {}, true};
   f.text = fmt::format("the legs of the URDF are too {}: the robot walks {:.1f} % {} by its legs than by the LiDAR and stands {:.1f} cm {}",
                        scale > 1 ? "long" : "short", 100 * std::abs(scale - 1), scale > 1 ? "farther" : "less far", 100 * std::abs(height),

@@ -14,6 +14,15 @@ constexpr double well_explained = 0.9;          // of the legs' acceleration
 // s, with and without a LiDAR: without one, soles that roll shift it by 6 ms, soft ones by more.
 constexpr double leg_clock_tolerance = 0.0045, alone_leg_clock_tolerance = 0.025;
 
+// What another evidence than the turning says.
+void adopt(const SO3& R, const Eigen::Vector3d& R_sigma, double offset, double offset_sigma, MountFit& fit) {
+  if (!fit.fit.good) fit.fit.cov = Eigen::MatrixXd::Zero(7, 7);
+  fit.fit.good = true;
+  fit.R = R;
+  fit.offset = offset;
+  fit.fit.cov.diagonal().head<4>() << R_sigma.cwiseAbs2(), offset_sigma * offset_sigma;
+}
+
 }  // namespace
 
 // By the turning alone: each interval by the foot that turns as the gyro does. The foot that swings turns as well: no mount that puts the
@@ -93,12 +102,7 @@ void Examination::examine_leg_rotation() {
     return;
   }
   if (stances.good) {
-    if (!fit.fit.good) fit.fit.cov = Eigen::MatrixXd::Zero(7, 7);
-    fit.fit.good = true;
-    fit.R = stances.R_link_imu.inverse();
-    fit.offset = stances.offset;
-    for (int i = 0; i < 3; ++i) fit.fit.cov(i, i) = stances.rotation_sigma[i] * stances.rotation_sigma[i];
-    fit.fit.cov(3, 3) = stances.offset_sigma * stances.offset_sigma;
+    adopt(stances.R_link_imu.inverse(), stances.rotation_sigma, stances.offset, stances.offset_sigma, fit);
     constexpr double stance_method = 0.2, stance_clock_method = 0.0004;  // degrees, s
     method = stance_method;
     clock_method = stance_clock_method;
@@ -106,12 +110,8 @@ void Examination::examine_leg_rotation() {
     examine_leg_shape();
     return;
   } else if (accelerates) {
-    if (!fit.fit.good) fit.fit.cov = Eigen::MatrixXd::Zero(7, 7);
-    fit.fit.good = true;
-    fit.R = start.imu.T_link_imu.R.inverse() * SO3::Exp(leg_acceleration_.turn);
-    fit.offset = leg_acceleration_.offset;
-    for (int i = 0; i < 3; ++i) fit.fit.cov(i, i) = leg_acceleration_.sigma[i] * leg_acceleration_.sigma[i];
-    fit.fit.cov(3, 3) = leg_acceleration_.offset_sigma * leg_acceleration_.offset_sigma;
+    adopt(start.imu.T_link_imu.R.inverse() * SO3::Exp(leg_acceleration_.turn), leg_acceleration_.sigma, leg_acceleration_.offset,
+          leg_acceleration_.offset_sigma, fit);
     method = 0.5 + 10 * (1 - leg_acceleration_.explained);
     clock_method = 0.001 + 0.04 * (1 - leg_acceleration_.explained);
   }

@@ -78,6 +78,8 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   Standing then;
   for (const LegHypothesis& h : all) {
     const auto k = static_cast<std::size_t>(&h - all.data());
+    // What one change explains needs no zero that is a quarter turn off.
+    if (k == first_gross && best != nullptr && then.worth() > as_feet_do * then.moving) break;
     if (k == joints) {
       if (best != nullptr) break;
       longer = std::max(2 * described.both() + least_standing, as_feet_do * described.moving);

@@ -55,7 +55,7 @@ MountFit fit_mount(const std::vector<Turn>& turns, const GyroPath& gyro, const S
 /// skew of its axes) is a part of the search, so that the mount is not taken for it. `start`: see fit_mount().
 MountFit refine_mount(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& start);
 
-/// The gyro's turning through the sensor's, and its standard deviation: the sensor's noise does not make it smaller.
+/// The gyro's turning through that of a sensor of one choice, and its standard deviation: the sensor's noise does not make it smaller.
 std::pair<double, double> gyro_scale(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& fit);
 
 /// The half of the intervals that a fit explains best: where a foot that is reported to stand does not roll.

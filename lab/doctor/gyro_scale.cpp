@@ -1,0 +1,50 @@
+// The gyro's scale, by a sensor that turns with it.
+#include <algorithm>
+#include <cmath>
+
+#include "lab/doctor/turns.hpp"
+
+namespace kilvo::lab {
+
+std::pair<double, double> gyro_scale(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& fit) {
+  // The sensor's rate = share * the gyro's - bias: a bias that was found with another scale is not right.
+  struct Block {
+    Eigen::Matrix4d H = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d g = Eigen::Vector4d::Zero();
+  };
+  Eigen::Vector4d x(1, 0, 0, 0);
+  double scale = 0;  // robust standard deviation of a rate
+  std::vector<Block> blocks;
+  Eigen::Matrix4d H;
+  for (int k = 0; k < 4; ++k) {
+    blocks.assign(1, {});
+    std::vector<double> errors;
+    double until = -1;
+    for (const Turn& turn : turns) {
+      const double a = turn.a + fit.offset, b = turn.b + fit.offset, dt = turn.b - turn.a;
+      if (!gyro.covers(a, b)) continue;
+      Eigen::Matrix<double, 3, 4> J;
+      J << fit.R.inverse() * Eigen::Vector3d(log_of(gyro.between(a, b)) / dt), -Eigen::Matrix3d::Identity();
+      const Eigen::Vector3d e = turn.theta[0] / dt - J * x;
+      errors.push_back(e.norm());
+      const double weight = k == 0 ? 1 : 1 / (1 + e.squaredNorm() / (4 * scale * scale));
+      if (until >= 0 && static_cast<int>(until / block_seconds) != static_cast<int>(turn.a / block_seconds)) blocks.emplace_back();
+      until = turn.a;
+      blocks.back().H += weight * J.transpose() * J;
+      blocks.back().g += weight * J.transpose() * e;
+    }
+    constexpr std::size_t fewest = 30;  // intervals
+    if (errors.size() < fewest) return {1, INFINITY};
+    const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+    std::ranges::nth_element(errors, middle);
+    scale = *middle + 1e-6;
+    H = 1e-9 * Eigen::Matrix4d::Identity();
+    Eigen::Vector4d g = Eigen::Vector4d::Zero();
+    for (const Block& block : blocks) H += block.H, g += block.g;
+    x += H.ldlt().solve(g);
+  }
+  const double share = x[0];
+  return share > 0 ? std::pair{1 / share, std::sqrt(jackknife(blocks, H)(0, 0)) / (share * share)} : std::pair<double, double>{1, INFINITY};
+}
+
+}  // namespace kilvo::lab
