@@ -77,6 +77,7 @@ class Examination {
   void examine_rates();
   void examine_acceleration_unit();
   void agree_with_gyro();
+  void try_gyro_in_degrees();
   void settle_axes();
   void examine_gyro_scale(const std::vector<Turn>& turns, const MountFit& fit);
   void accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence);

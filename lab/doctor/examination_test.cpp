@@ -140,6 +140,13 @@ TEST(Doctor, AGyroThatIsATenthTooFastIsNamed) {
   }
 }
 
+TEST(Doctor, AGyroInDegreesIsNamedByTheLidarAlone) {
+  Recorded recorded = walked().recorded;
+  recorded.legs.clear();
+  for (InertialSample& s : recorded.imu) s.gyro *= 57.29577951308232;
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("gyro_unit"));
+}
+
 TEST(Doctor, PointsOfAnotherUnitAreNamed) {
   for (const float factor : {3.28F, 100.0F}) {
     Recorder recorder;

@@ -1,8 +1,9 @@
-// The gyro's scale, by a sensor that turns with it.
+// The unit and the scale of the gyro, by a sensor that turns with it.
 #include <algorithm>
 #include <cmath>
+#include <fmt/core.h>
 
-#include "lab/doctor/turns.hpp"
+#include "lab/doctor/examination.hpp"
 
 namespace kilvo::lab {
 
@@ -45,6 +46,46 @@ std::pair<double, double> gyro_scale(const std::vector<Turn>& turns, const GyroP
   }
   const double share = x[0];
   return share > 0 ? std::pair{1 / share, std::sqrt(jackknife(blocks, H)(0, 0)) / (share * share)} : std::pair<double, double>{1, INFINITY};
+}
+
+// Of a walk that turns, degrees taken for radians turn by more than half a turn from sweep to sweep: as they are they agree with nothing.
+void Examination::try_gyro_in_degrees() {
+  if (lidar_.known || lidar_turns_.empty()) return;
+  const Eigen::Matrix3d before = gyro_axes_;
+  gyro_axes_ = before / degrees(1);
+  const SenseAgreement in_degrees = agreement(lidar_turns_, robot_.lidar.T_imu_lidar.R, 0.8);
+  if (!in_degrees.known) {
+    gyro_axes_ = before;
+    return;
+  }
+  lidar_ = in_degrees;
+  find({Sensor::imu,
+        "gyro_unit",
+        "the gyro is in degrees per second, not in rad/s",
+        fmt::format("the LiDAR's sweeps explain {:.0f} % of its turning then", 100 * in_degrees.explained),
+        "the driver must publish rad/s",
+        degrees(1),
+        "",
+        {},
+        true});
+}
+
+// A gyro of a robot is within a percent; sweeps show it to a thousandth.
+void Examination::examine_gyro_scale(const std::vector<Turn>& turns, const MountFit& fit) {
+  const auto [scale, sigma] = gyro_scale(turns, gyro(), fit);
+  constexpr double tolerance = 0.04;
+  if (std::abs(scale - 1) < std::max(tolerance, sure * sigma)) return;
+  gyro_axes_ /= scale;
+  gyro_bias_ /= scale;
+  find({Sensor::imu,
+        "gyro_unit",
+        fmt::format("the gyro measures {:.3f} times the turning", scale),
+        fmt::format("turning by the gyro through that of the LiDAR's sweeps: {:.3f}, standard deviation {:.3f}", scale, sigma),
+        "the driver must publish rad/s: the scale of its gyro is wrong",
+        scale,
+        "",
+        {},
+        true});
 }
 
 }  // namespace kilvo::lab

@@ -123,6 +123,7 @@ void Examination::examine_acceleration_unit() {
 }
 
 void Examination::agree_with_gyro() {
+  try_gyro_in_degrees();
   if (lidar_.known && is_far_from_one(lidar_.scale) && is_far_throughout(lidar_turns_, gyro(), lidar_.offset)) {
     const bool deg = std::abs(lidar_.scale / per_degree - 1) < 0.15;
     const double factor = deg ? per_degree : lidar_.scale;
@@ -163,24 +164,6 @@ void Examination::agree_with_gyro() {
   } else {
     gyro_axes_ = before;
   }
-}
-
-// A gyro of a robot is within a percent; sweeps show it to a thousandth.
-void Examination::examine_gyro_scale(const std::vector<Turn>& turns, const MountFit& fit) {
-  const auto [scale, sigma] = gyro_scale(turns, gyro(), fit);
-  constexpr double tolerance = 0.04;
-  if (std::abs(scale - 1) < std::max(tolerance, sure * sigma)) return;
-  gyro_axes_ /= scale;
-  gyro_bias_ /= scale;
-  find({Sensor::imu,
-        "gyro_unit",
-        fmt::format("the gyro measures {:.3f} times the turning", scale),
-        fmt::format("turning by the gyro through that of the LiDAR's sweeps: {:.3f}, standard deviation {:.3f}", scale, sigma),
-        "the driver must publish rad/s: the scale of its gyro is wrong",
-        scale,
-        "",
-        {},
-        true});
 }
 
 void Examination::accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence) {
