@@ -29,7 +29,6 @@ inline double sure_among(std::size_t hypotheses) { return std::sqrt(sure * sure 
 inline double smaller_by(double share, double than, double independent) {
   return independent > 0 && share > 0 && than > 0 ? std::log(than / share) * std::sqrt(independent) / 2 : 0;
 }
-inline constexpr double gravity = 9.80665;     // m/s^2
 inline constexpr double turn_interval = 0.04;  // s, of a turn of the legs
 inline constexpr double pose_period = 0.009;   // s, between poses of the legs
 

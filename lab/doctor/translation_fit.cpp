@@ -20,12 +20,16 @@ constexpr double position_prior = 1;        // m
 constexpr double accel_axes_prior = 0.005;  // of an element: scale and misalignment of an IMU of a robot
 constexpr double weak = 0.02;               // share of the sweep's information; below it the LiDAR does not know its way
 constexpr std::size_t fewest_rows = 40;     // rows
+constexpr double freedom = 12;              // degrees, of the rows' distribution (Student)
 
 // Velocity and place that a constant force in the IMU frame (one column for each element of the axes) gives from a to b, in the frame of
 // the IMU at a. Each sample holds until the middle between its neighbours.
 struct Integral {
   Matrix39 v = Matrix39::Zero(), p = Matrix39::Zero();
   Eigen::Matrix3d v_bias = Eigen::Matrix3d::Zero(), p_bias = Eigen::Matrix3d::Zero();
+  // Of the squared velocities that the samples add beyond gravity: by the square of the share of the time that has passed, that is left,
+  // and by their product.
+  double past = 0, left = 0, product = 0;
 };
 
 Integral integrate(const std::vector<InertialSample>& imu, const GyroPath& gyro, double a, double b) {
@@ -47,6 +51,10 @@ Integral integrate(const std::vector<InertialSample>& imu, const GyroPath& gyro,
     out.p_bias += dt * out.v_bias - 0.5 * dt * dt * R;
     out.v += dt * F;
     out.v_bias -= dt * R;
+    const double push = dt * std::max(0.0, f.norm() - gravity), passed = (0.5 * (from + to) - a) / (b - a);
+    out.past += push * push * passed * passed;
+    out.left += push * push * (1 - passed) * (1 - passed);
+    out.product += push * push * passed * (1 - passed);
   }
   return out;
 }
@@ -86,6 +94,10 @@ TranslationRows::TranslationRows(const std::vector<SweepPose>& poses, const std:
     row.follows = !rows_.empty() && last + 1 == k;
     last = k;
     row.dt = 0.5 * (before + after);
+    row.before = before;
+    row.after = after;
+    row.pushed = I.past + J.left;
+    row.shared = I.product;
     row.y = (c.T_WL.p - b.T_WL.p) / after - (b.T_WL.p - a.T_WL.p) / before;
     row.H_r = (R_c.matrix() - R_b.matrix()) / after - (R_b.matrix() - R_a.matrix()) / before;
     row.H_ba = R_a.matrix() * (I.v_bias - I.p_bias / before) + R_b.matrix() * J.p_bias / after;
@@ -103,6 +115,12 @@ struct TranslationRows::Equations {
   static constexpr int most = 18;
   std::vector<Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most>> J;
   std::vector<Eigen::Vector3d> y;
+  double log_scale = 0;  // mean logarithm of what the rows were divided by
+
+  void subtract(std::size_t row, double times, std::size_t before) {
+    J[row] -= times * J[row - before];
+    y[row] -= times * y[row - before];
+  }
 };
 
 TranslationRows::Equations TranslationRows::equations(const Eigen::Matrix3d& axes, bool free_axes) const {
@@ -118,18 +136,30 @@ TranslationRows::Equations TranslationRows::equations(const Eigen::Matrix3d& axe
   return out;
 }
 
-// A place that is tracked with this gain of a Kalman filter at rest, and the gain of its velocity that goes with it: a second difference is
-// a sum of three prediction errors, of which two are known. P. R. Kalata, "The tracking index", 1984.
-TranslationRows::Equations TranslationRows::whitened(const Equations& of, double gain) const {
-  const double of_velocity = 2 * (2 - gain) - 4 * std::sqrt(1 - gain), first = gain + of_velocity - 2, second = 1 - gain;
+// The rows without what each has in common with the two before it, divided by its own standard deviation: the noise of a sweep's place is
+// in three of them, that of the acceleration in an interval in two. By the Cholesky factor of their covariance, which is a band.
+TranslationRows::Equations TranslationRows::whitened(const Equations& of, const Noise& noise) const {
   Equations out = of;
-  for (std::size_t i = 1; i < rows_.size(); ++i) {
-    if (!rows_[i].follows) continue;
-    out.J[i] -= first * out.J[i - 1];
-    out.y[i] -= first * out.y[i - 1];
-    if (i < 2 || !rows_[i - 1].follows) continue;
-    out.J[i] -= second * out.J[i - 2];
-    out.y[i] -= second * out.y[i - 2];
+  const double white = noise.accel * noise.accel, push = noise.push * noise.push;
+  double own = 1, own_before = 1, with_last = 0;  // elements of the factor
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const Row& row = rows_[i];
+    const double a = 1 / row.before, b = 1 / row.after;
+    const double variance = 2 * (a * a + b * b + a * b) + white * (row.before + row.after) / 3 + push * row.pushed;
+    double covariance = 0, with_second = 0;
+    if (row.follows) {
+      const Row& last = rows_[i - 1];
+      covariance = -a * (2 * a + b + 1 / last.before) + white * row.before / 6 + push * row.shared;
+      if (last.follows) with_second = a / last.before / own_before;
+    }
+    with_last = (covariance - with_second * with_last) / own;
+    if (row.follows) out.subtract(i, with_last, 1);
+    if (with_second != 0) out.subtract(i, with_second, 2);
+    own_before = own;
+    own = std::sqrt(variance - with_last * with_last - with_second * with_second);
+    out.J[i] /= own;
+    out.y[i] /= own;
+    out.log_scale += std::log(own) / static_cast<double>(rows_.size());
   }
   return out;
 }
@@ -145,6 +175,7 @@ std::optional<TranslationRows::Solution> TranslationRows::solve(const Equations&
   out.scale = 0.3;
   for (int k = 0; k < 8; ++k) {
     const double s2 = out.scale * out.scale;
+    out.unlikely = 3 * std::log(out.scale);
     const Eigen::MatrixXd H_prior = s2 * Eigen::MatrixXd(prior.asDiagonal());
     std::vector<Block> blocks(1, Block(n));
     Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
@@ -152,7 +183,8 @@ std::optional<TranslationRows::Solution> TranslationRows::solve(const Equations&
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       const Eigen::Vector3d e = of.y[i] - of.J[i] * out.x;
       lengths.push_back(e.squaredNorm());
-      const double weight = 1 / (1 + e.squaredNorm() / (12 * s2));
+      const double far = e.squaredNorm() / (freedom * s2), weight = 1 / (1 + far);
+      out.unlikely += (freedom + 3) / 2 * std::log1p(far) / static_cast<double>(rows_.size());
       if (i > 0 && static_cast<int>(rows_[i - 1].t / block_seconds) != static_cast<int>(rows_[i].t / block_seconds)) blocks.emplace_back(n);
       blocks.back().H += weight * of.J[i].transpose().lazyProduct(of.J[i]);
       blocks.back().g += weight * of.J[i].transpose() * e;
@@ -182,9 +214,15 @@ std::optional<TranslationFit> TranslationRows::refine(const Eigen::Matrix3d& axe
   if (!out) return std::nullopt;
   const Equations with_axes = equations(axes, true);
   std::optional<Solution> best;
-  for (const double gain : {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9}) {
-    std::optional<Solution> found = solve(whitened(with_axes, gain));
-    if (found && (!best || found->scale < best->scale)) best = std::move(found);
+  // The most likely noise: an accelerometer errs by a share of what it measures beyond gravity, where impacts end its range or alias.
+  for (const double push : {0.0, 25.0, 50.0, 100.0, 200.0, 400.0}) {
+    for (const double accel : {1.0, 3.0, 10.0, 30.0, 100.0}) {
+      const Equations rows = whitened(with_axes, {accel, push});
+      std::optional<Solution> found = solve(rows);
+      if (!found) continue;
+      found->unlikely += 3 * rows.log_scale;
+      if (!best || found->unlikely < best->unlikely) best = std::move(found);
+    }
   }
   if (!best) return out;
   out->r = best->x.head<3>();

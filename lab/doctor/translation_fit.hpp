@@ -11,6 +11,8 @@
 
 namespace kilvo::lab {
 
+inline constexpr double gravity = 9.80665;  // m/s^2
+
 struct TranslationFit {
   Eigen::Vector3d r = Eigen::Vector3d::Zero();                            // LiDAR in the IMU frame, m
   Eigen::Vector3d g_W = Eigen::Vector3d::Zero();                          // gravity in the frame of the LiDAR's way, m/s^2
@@ -48,19 +50,26 @@ class TranslationRows {
 
  private:
   struct Row {
-    double t, dt;
-    bool follows;  // the row before is of the sweep before
+    double t, dt, before, after;  // s: of the sweep, mean of the two intervals, each of them
+    bool follows;                 // the row before is of the sweep before
+    // What is left of the squared velocities that samples beyond gravity add: in this row, and in common with the row before. (m/s)^2
+    double pushed, shared;
     Eigen::Matrix3d H_r, H_ba;
     Eigen::Vector3d y;
     Eigen::Matrix<double, 3, 9> force;  // of each element of the axes, row by row
   };
   struct Equations;
   Equations equations(const Eigen::Matrix3d& axes, bool free_axes) const;
-  Equations whitened(const Equations& of, double gain) const;
+  /// For a noise of one metre of each place: density of the acceleration, 1/s^1.5, and error of what is beyond gravity, 1/m.
+  struct Noise {
+    double accel, push;
+  };
+  Equations whitened(const Equations& of, const Noise& noise) const;
   struct Solution {
     Eigen::VectorXd x;
     Eigen::MatrixXd cov;
-    double scale = 0;  // robust standard deviation of a row
+    double scale = 0;     // robust standard deviation of a row
+    double unlikely = 0;  // minus the mean logarithm of the likelihood
   };
   std::optional<Solution> solve(const Equations& of) const;
   std::vector<Row> rows_;
