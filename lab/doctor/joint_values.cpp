@@ -1,4 +1,5 @@
-// What the positions of the joints show by themselves, without any description: joints that never turn, joints that show another's angle.
+// What the positions of the joints show without the lengths and axes of the description: joints that never turn, joints that show another's
+// angle.
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
@@ -17,16 +18,19 @@ struct Range {
   double size() const { return high - low; }
 };
 
-std::vector<Range> ranges_of(const std::vector<LegSample>& legs) {
-  std::vector<Range> out(legs.front().position.size());
+// Of so many joints; messages with fewer positions than names say nothing.
+std::vector<Range> ranges_of(const std::vector<LegSample>& legs, std::size_t joints) {
+  std::vector<Range> out(joints);
   for (const LegSample& s : legs) {
-    for (std::size_t i = 0; i < out.size(); ++i) out[i] = {std::min(out[i].low, s.position[i]), std::max(out[i].high, s.position[i])};
+    for (std::size_t i = 0; s.position.size() == joints && i < joints; ++i)
+      out[i] = {std::min(out[i].low, s.position[i]), std::max(out[i].high, s.position[i])};
   }
   return out;
 }
 
 bool same_values(const std::vector<LegSample>& legs, std::size_t a, std::size_t b) {
-  return std::ranges::all_of(legs, [&](const LegSample& s) { return s.position[a] == s.position[b]; });
+  return std::ranges::all_of(legs,
+                             [&](const LegSample& s) { return s.position.size() <= std::max(a, b) || s.position[a] == s.position[b]; });
 }
 
 }  // namespace
@@ -34,14 +38,14 @@ bool same_values(const std::vector<LegSample>& legs, std::size_t a, std::size_t 
 // False when the legs cannot be judged with these values.
 bool Examination::examine_joint_values() {
   const std::vector<std::size_t> joints = recorded_legs_.joints_that_matter(robot_);
-  const std::vector<Range> ranges = ranges_of(recorded_.legs);
+  const std::vector<Range> ranges = ranges_of(recorded_.legs, recorded_.joint_names.size());
   const std::vector<std::string>& names = recorded_.joint_names;
   std::string frozen, repeated;
   const auto add = [](std::string& to, const std::string& text) { to += (to.empty() ? "" : ", ") + text; };
   for (const std::size_t i : joints) {
     const auto twin = std::ranges::find(names, other_side(names[i])) - names.begin();
     const auto j = static_cast<std::size_t>(twin);
-    if (j == names.size() || j == i) continue;
+    if (j == names.size() || j == i || i >= names.size()) continue;
     // The same joint of the other leg walks.
     if (ranges[i].size() < at_rest && ranges[j].size() > turns) add(frozen, names[i]);
     if (i < j && ranges[i].size() > turns && same_values(recorded_.legs, i, j)) add(repeated, names[i] + " and " + names[j]);
