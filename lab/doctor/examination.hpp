@@ -72,11 +72,12 @@ class Examination {
   Earlier for_later() { return std::move(earlier_); }
 
  private:
-  // imu_examination.cpp
+  // imu_examination.cpp, gyro_scale.cpp
   void examine_rates();
   void examine_acceleration_unit();
   void agree_with_gyro();
   void try_gyro_in_degrees();
+  void accuse_gyro_in_degrees(const std::string& evidence);
   void settle_axes();
   void examine_gyro_scale(const std::vector<Turn>& turns, const MountFit& fit);
   void accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence);
@@ -99,6 +100,7 @@ class Examination {
   void examine_lidar_clock(const MountFit& fit);
   void examine_lidar_position();
   bool examine_lidar_scale();
+  void accuse_lidar_scale(double factor, const std::string& evidence);
   // leg_examination.cpp
   void examine_legs();
   /// Of the legs' turning: a sole rolls one way for half of a quick step.
@@ -146,7 +148,7 @@ class Examination {
   LegWay measure_leg_way(const LegHypothesis* hypothesis) const;
   bool accuse_exchanged_legs(double scale, const std::string& evidence);
   void examine_leg_lengths();
-  bool lidar_is_too_large(double scale, const std::string& evidence);
+  bool accuse_lidar_instead(double scale, const std::string& evidence);
   void accuse_leg_lengths(double scale, double height);
   void accuse_imu_place(double height);
   void accuse_uneven_legs(double uneven);

@@ -59,10 +59,14 @@ void Examination::try_gyro_in_degrees() {
     return;
   }
   lidar_ = in_degrees;
+  accuse_gyro_in_degrees(fmt::format("the LiDAR's sweeps explain {:.0f} % of its turning then", 100 * in_degrees.explained));
+}
+
+void Examination::accuse_gyro_in_degrees(const std::string& evidence) {
   find({Sensor::imu,
         "gyro_unit",
         "the gyro is in degrees per second, not in rad/s",
-        fmt::format("the LiDAR's sweeps explain {:.0f} % of its turning then", 100 * in_degrees.explained),
+        evidence,
         "the driver must publish rad/s",
         degrees(1),
         "",

@@ -152,15 +152,7 @@ void Examination::agree_with_gyro() {
   const SenseAgreement in_degrees = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), 0.5);
   if (in_degrees.known && 1 - in_degrees.explained < 0.5 * (1 - legs_.explained)) {
     legs_ = in_degrees;
-    find({Sensor::imu,
-          "gyro_unit",
-          "the gyro is in degrees per second, not in rad/s",
-          fmt::format("the legs explain {:.0f} % of its turning then", 100 * in_degrees.explained),
-          "the driver must publish rad/s",
-          per_degree,
-          "",
-          {},
-          true});
+    accuse_gyro_in_degrees(fmt::format("the legs explain {:.0f} % of its turning then", 100 * in_degrees.explained));
   } else {
     gyro_axes_ = before;
   }

@@ -238,7 +238,7 @@ void Examination::examine_leg_lengths() {
   }
   // Legs that are too long walk too far and stand too high; an IMU that is too high only stands too high.
   const bool lengths = height_wrong ? (scale - 1) * *height > 0 && std::abs(scale - 1) > 0.02 : true;
-  if (lengths && lidar_is_too_large(1 / scale, detail)) return;
+  if (lengths && accuse_lidar_instead(1 / scale, detail)) return;
   if (lengths) {
     accuse_leg_lengths(scale, height.value_or(0));
   } else {
@@ -247,21 +247,13 @@ void Examination::examine_leg_lengths() {
   diagnosis_.findings.back().evidence = detail;
 }
 
-// Legs that are too short, or points that are too far: the accelerometer is with one of them. A URDF is wrong more often.
-bool Examination::lidar_is_too_large(double scale, const std::string& evidence) {
+// Legs that are too short and points that are too far look alike: the acceleration agrees with one of them. A URDF is wrong more often.
+bool Examination::accuse_lidar_instead(double scale, const std::string& evidence) {
   constexpr double clearly = 2;  // standard deviations
   const double if_lidar = lidar_scale_.distance_to(scale), if_legs = lidar_scale_.distance_to(1);
   if (!(if_legs * if_legs - if_lidar * if_lidar > clearly * clearly)) return false;
-  find({Sensor::lidar,
-        "lidar_unit",
-        fmt::format("the LiDAR's points are {:.3f} times as far as they should be", scale),
-        fmt::format("{}; way of the sweeps through that of the accelerometer {:.3f}, standard deviation {:.3f}", evidence,
-                    lidar_scale_.factor, lidar_scale_.sigma),
-        "the driver must publish metres: the scale of its ranges is wrong",
-        scale,
-        "",
-        {},
-        true});
+  accuse_lidar_scale(scale, fmt::format("{}; way of the sweeps through that of the accelerometer {:.3f}, standard deviation {:.3f}",
+                                        evidence, lidar_scale_.factor, lidar_scale_.sigma));
   return true;
 }
 

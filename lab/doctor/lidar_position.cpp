@@ -77,18 +77,23 @@ bool Examination::examine_lidar_scale() {
   constexpr double tolerance = 0.1;
   const WayScale& s = lidar_scale_;
   if (s.distance_to(1) < sure || (s.factor < 1 + tolerance && s.most > 1 - tolerance)) return false;
-  find({Sensor::lidar,
-        "lidar_unit",
-        fmt::format("the LiDAR's points are {:.2f} times as far as they should be", s.factor),
-        fmt::format("way of the sweeps through that of the accelerometer: {:.3f}, standard deviation {:.3f}", s.factor, s.sigma),
-        "the driver must publish metres",
-        s.factor,
-        "",
-        {},
-        true});
+  accuse_lidar_scale(
+      s.factor, fmt::format("way of the sweeps through that of the accelerometer: {:.3f}, standard deviation {:.3f}", s.factor, s.sigma));
   translation_.reset();
   way_.clear();
   return true;
+}
+
+void Examination::accuse_lidar_scale(double factor, const std::string& evidence) {
+  find({Sensor::lidar,
+        "lidar_unit",
+        fmt::format("the LiDAR's points are {:.3f} times as far as they should be", factor),
+        evidence,
+        "the driver must publish metres: the scale of its ranges is wrong",
+        factor,
+        "",
+        {},
+        true});
 }
 
 }  // namespace kilvo::lab
