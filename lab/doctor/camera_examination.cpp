@@ -163,6 +163,17 @@ bool Examination::try_camera_hypotheses(const CameraTracks& tracks) {
     best = error;
     which = &h;
   }
+  // None of these.
+  if (best > bad) {
+    CameraMount m = robot_.camera;
+    m.T_imu_camera.R = tracks.fit_any_rotation({m, 0}).R_IC;
+    if (const double error = tracks.error({m, 0}); error < much_better_images * best) {
+      accuse_camera_rotation(
+          m.T_imu_camera.R,
+          fmt::format("corners of the images are {:.2f} px from their epipolar lines then, {:.2f} px as described", error, described));
+      return true;
+    }
+  }
   const std::string evidence =
       fmt::format("corners of the images are {:.2f} px from their epipolar lines then, {:.2f} px as described", best, described);
   if (which != nullptr) {
@@ -177,6 +188,18 @@ bool Examination::try_camera_hypotheses(const CameraTracks& tracks) {
   const CameraFit fit = tracks.fit({robot_.camera, offset}, false, true);
   find_offset(Sensor::camera, fit.fit.good ? fit.offset : offset, fit.fit.good ? fit.fit.sigma(4) : 0.005, evidence);
   return true;
+}
+
+void Examination::accuse_camera_rotation(const SO3& R_IC, const std::string& evidence) {
+  const SO3 before = robot_.camera.T_imu_camera.R;
+  Finding f;
+  f.sensor = Sensor::camera;
+  f.cause = "camera_rotation";
+  f.text = fmt::format("the camera is turned against its description by {} of the camera", turn_text(before.inverse() * R_IC));
+  f.evidence = evidence;
+  f.turn = (R_IC * before.inverse()).Log();
+  robot_.camera.T_imu_camera.R = R_IC;
+  find_rotation(std::move(f), original_.camera.T_imu_camera.R, R_IC, "camera.T_imu_camera.R");
 }
 
 // A principal point that is off moves the image as a turn of the camera does, but for its corners.
@@ -238,22 +261,21 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
   refine_offset(Sensor::camera, fit.offset, fit.fit.sigma(4), clock_method);
   if (angle > std::max(camera_rotation_tolerance, sure * uncertain) && angle < 15 && accuse_principal_point(tracks, fit)) return;
   if (angle > std::max(camera_rotation_tolerance, sure * uncertain)) {
-    Finding f;
-    f.sensor = Sensor::camera;
-    f.cause = "camera_rotation";
-    f.text = fmt::format("the camera is turned against its description by {} of the camera", turn_text(before.inverse() * fit.R_IC));
-    f.evidence = rotation;
-    f.turn = (fit.R_IC * before.inverse()).Log();
     std::erase_if(diagnosis_.findings, [](const Finding& x) { return x.cause == "camera_rotation"; });
-    robot_.camera.T_imu_camera.R = fit.R_IC;
-    find_rotation(std::move(f), original_.camera.T_imu_camera.R, fit.R_IC, "camera.T_imu_camera.R");
+    accuse_camera_rotation(fit.R_IC, rotation);
   } else {
     check(Sensor::camera, "rotation of the mount", uncertain > 2 ? Check::Verdict::unknown : Check::Verdict::good, rotation);
   }
   const double focal_sigma = fit.fit.sigma(3);
   const std::string focal = fmt::format("{:.4f} times the described one, standard deviation {:.4f}", fit.focal, focal_sigma);
-  const bool better = fit.error < 0.85 * tracks.fit({robot_.camera, 0}, false, true).error;
-  if (std::abs(fit.fit.x[3]) > std::max(focal_tolerance, sure * focal_sigma) && better) {
+  const auto holds = [&] {
+    if (fit.error >= 0.85 * tracks.fit({robot_.camera, 0}, false, true).error) return false;
+    // Of a camera at another place than described the LiDAR's way looks like another focal length; the turning alone does not.
+    const GyroPath path = gyro();
+    const CameraFit turning = CameraTracks(recorded_.tracks, path, nullptr).fit({robot_.camera, 0}, true, true);
+    return turning.fit.good && turning.fit.x[3] / fit.fit.x[3] > 0.5;
+  };
+  if (std::abs(fit.fit.x[3]) > std::max(focal_tolerance, sure * focal_sigma) && holds()) {
     const double fx = fit.focal * robot_.camera.fx, fy = fit.focal * robot_.camera.fy;
     find({Sensor::camera,
           "camera_focal",

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 #include "kilvo/math/decompositions.hpp"
@@ -16,6 +17,27 @@ constexpr std::size_t most_pairs = 160;
 constexpr double camera_slack = 0.06;      // s, at both ends of the gyro's path
 constexpr double least_image_way = 0.012;  // m between images, below which the direction is not known
 constexpr double near_epipole = 0.08;      // sine
+
+// Rotations that lie evenly among all, some 15 degrees apart (Alexa: Super-Fibonacci Spirals, CVPR 2022).
+std::vector<SO3> even_rotations() {
+  constexpr int count = 1500;
+  constexpr double phi = 1.4142135623730951, psi = 1.5337511687552043;
+  std::vector<SO3> out;
+  for (int i = 0; i < count; ++i) {
+    const double s = i + 0.5, turn = 2 * std::numbers::pi * s, r = std::sqrt(s / count), R = std::sqrt(1 - s / count);
+    out.push_back(
+        SO3::from_quaternion({R * std::cos(turn / psi), r * std::sin(turn / phi), r * std::cos(turn / phi), R * std::sin(turn / psi)}));
+  }
+  return out;
+}
+
+// px: a mean that some outliers do not move. In units of a pixel of the image, not of the guess: a shorter focal length must not look
+// better.
+double typical(const Residuals& r) {
+  double sum = 0;
+  for (const double e : r.r) sum += std::log1p(e * e);
+  return std::sqrt(std::expm1(sum / static_cast<double>(r.groups())));
+}
 
 double clamp_px(double e) { return std::clamp(e, -200.0, 200.0); }
 
@@ -111,10 +133,7 @@ double CameraTracks::error(const CameraGuess& guess) const {
     Residuals r;
     residuals(guess, rays_of(guess.mount), guess.mount.T_imu_camera.R, 1, guess.offset, std::max<std::size_t>(1, pairs_.size() / 60), r);
     if (r.groups() < 300) return INFINITY;
-    // In units of a pixel of the image, not of the guess: a shorter focal length must not look better.
-    double sum = 0;
-    for (const double e : r.r) sum += std::log1p(e * e);
-    return std::sqrt(std::expm1(sum / static_cast<double>(r.groups())));
+    return typical(r);
   } catch (const std::invalid_argument&) {
     return INFINITY;
   }
@@ -144,6 +163,37 @@ CameraFit CameraTracks::fit(const CameraGuess& guess, bool with_focal, bool with
   out.offset = guess.offset + out.fit.x[4];
   out.error = out.fit.scale;
   return out;
+}
+
+CameraFit CameraTracks::fit_any_rotation(const CameraGuess& guess) const {
+  constexpr std::size_t looked_at = 25, refined = 10;  // pairs of images, rotations
+  std::vector<std::vector<Eigen::Vector4d>> rays;
+  try {
+    rays = rays_of(guess.mount);
+  } catch (const std::invalid_argument&) {
+    return {};
+  }
+  std::vector<std::pair<double, SO3>> starts;
+  for (const SO3& R : even_rotations()) {
+    Residuals r;
+    residuals(guess, rays, R, 1, guess.offset, std::max<std::size_t>(1, pairs_.size() / looked_at), r);
+    starts.emplace_back(typical(r), R);
+  }
+  std::ranges::sort(starts, {}, [](const auto& start) { return start.first; });
+  CameraFit best;
+  double least = INFINITY;
+  for (std::size_t i = 0; i < refined; ++i) {
+    CameraGuess start = guess;
+    start.mount.T_imu_camera.R = starts[i].second;
+    const CameraFit found = fit(start, false, false);
+    if (!found.fit.good) continue;
+    start.mount.T_imu_camera.R = found.R_IC;
+    if (const double error = this->error(start); error < least) {
+      least = error;
+      best = found;
+    }
+  }
+  return best;
 }
 
 std::vector<double> CameraTracks::likely_offsets(double reach) const {

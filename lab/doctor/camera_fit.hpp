@@ -51,6 +51,8 @@ class CameraTracks {
   /// px: robust distance from the epipolar lines under a guess; infinite when it cannot be judged.
   double error(const CameraGuess& guess) const;
   CameraFit fit(const CameraGuess& guess, bool with_focal, bool with_offset) const;
+  /// The best of all rotations, whatever that of the guess.
+  CameraFit fit_any_rotation(const CameraGuess& guess) const;
   /// Offsets at which the images' motion is strong when the gyro's is; the likeliest first.
   std::vector<double> likely_offsets(double reach) const;
 

@@ -158,6 +158,7 @@ class Examination {
   void examine_camera();
   bool try_camera_hypotheses(const CameraTracks& tracks);
   void examine_camera_fit(const CameraTracks& tracks);
+  void accuse_camera_rotation(const SO3& R_IC, const std::string& evidence);
   bool accuse_principal_point(const CameraTracks& tracks, const CameraFit& fit);
 
   GyroPath gyro() const { return {recorded_.imu, gyro_axes_, gyro_bias_}; }
