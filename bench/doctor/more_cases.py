@@ -30,6 +30,17 @@ def other_order(R):
     return rotation_of(np.array([z, w, x, y]))
 
 
+def any_rotations():
+    """Five rotations that have nothing to do with the axes."""
+    rng = np.random.default_rng(7)
+    quaternions = rng.normal(size=(5, 4))
+    return [rotation_of(q / np.linalg.norm(q)) for q in quaternions]
+
+
+def turned_anyhow(sensor, key, R, texts, cause):
+    return [(f"{sensor} turned anyhow, {i}", texts(key, any_R @ R), [cause]) for i, any_R in enumerate(any_rotations())]
+
+
 def differ(A, B, degrees=3):
     return math.degrees(math.acos(max(-1, min(1, (np.trace(A.T @ B) - 1) / 2)))) > degrees
 
@@ -45,7 +56,7 @@ def mount_cases(config, texts, pose, rotation):
     out.append(("LiDAR's place with y negated", texts(key, p=p * [1, -1, 1] + [0, 0.03 if abs(p[1]) < 0.03 else 0, 0]), ["lidar_position"]))
     for ms in (-50, 8):
         out.append((f"LiDAR's time_offset {ms} ms", [f"lidar.time_offset={ms / 1000}"], ["lidar_clock"]))
-    return out
+    return out + turned_anyhow("LiDAR", key, R, texts, "lidar_rotation")
 
 
 def leg_cases(config, folder, work, texts, pose, rotation):
@@ -54,6 +65,7 @@ def leg_cases(config, folder, work, texts, pose, rotation):
     key = "imu.T_link_imu"
     if differ(other_order(R), R):
         out.append(("IMU's quaternion in another order", texts(key, other_order(R)), ["imu_mount_rotation"]))
+    out += turned_anyhow("IMU", key, R, texts, "imu_mount_rotation")
     out.append(("IMU described upright", texts(key, R @ UPSIDE_DOWN), ["imu_mount_rotation"]))
     out.append(("IMU's place in millimetres", texts(key, p=1000 * p), ["imu_mount_position"]))
     out.append(("IMU pitched by 8", texts(key, rotation("y", 8) @ R), ["imu_mount_rotation"]))
@@ -103,7 +115,7 @@ def camera_cases(config, texts, pose, rotation):
     out.append(("camera mirrored left to right", texts(key, R @ rotation("y", 180)), ["camera_rotation"]))
     out.append(("camera's intrinsics of the full sensor", [f"camera.{k}={2 * c[k]:g}" for k in ("fx", "fy", "cx", "cy")], ["camera_focal", "camera_principal_point"]))
     out.append(("camera's fx and fy swapped with cx and cy", [f"camera.{a}={c[b]:g}" for a, b in (("fx", "cx"), ("fy", "cy"), ("cx", "fx"), ("cy", "fy"))], ["camera_focal", "camera_principal_point"]))
-    return out
+    return out + turned_anyhow("camera", key, R, texts, "camera_rotation")
 
 
 def description_cases(config, folder, work, texts, pose, rotation):

@@ -186,14 +186,16 @@ CameraFit CameraTracks::fit_any_rotation(const CameraGuess& guess) const {
     CameraGuess start = guess;
     start.mount.T_imu_camera.R = starts[i].second;
     const CameraFit found = fit(start, false, false);
-    if (!found.fit.good) continue;
     start.mount.T_imu_camera.R = found.R_IC;
-    if (const double error = this->error(start); error < least) {
-      least = error;
-      best = found;
-    }
+    const double error = this->error(start);
+    if (!found.fit.good || error >= least) continue;
+    least = error;
+    best = found;
   }
-  return best;
+  // From so far away the first fit ends some tenths of a degree too early.
+  CameraGuess near = guess;
+  near.mount.T_imu_camera.R = best.R_IC;
+  return best.fit.good ? fit(near, false, false) : best;
 }
 
 std::vector<double> CameraTracks::likely_offsets(double reach) const {

@@ -40,10 +40,11 @@ bool Examination::examine_joint_values() {
   const std::vector<std::size_t> joints = recorded_legs_.joints_that_matter(robot_);
   const std::vector<Range> ranges = ranges_of(recorded_.legs, recorded_.joint_names.size());
   const std::vector<std::string>& names = recorded_.joint_names;
+  const LegSides sides = recorded_legs_.sides(robot_);
   std::string frozen, repeated;
   const auto add = [](std::string& to, const std::string& text) { to += (to.empty() ? "" : ", ") + text; };
   for (const std::size_t i : joints) {
-    const auto twin = std::ranges::find(names, other_side(names[i])) - names.begin();
+    const auto twin = std::ranges::find(names, sides.other_joint(names[i])) - names.begin();
     const auto j = static_cast<std::size_t>(twin);
     if (j == names.size() || j == i || i >= names.size()) continue;
     // The same joint of the other leg walks.

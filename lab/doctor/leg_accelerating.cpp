@@ -22,7 +22,7 @@ bool Examination::try_acceleration_hypotheses() {
   constexpr double well = 0.95;  // of the acceleration
   if (described.rows == 0 || described.explained > well) return false;
   std::vector<LegHypothesis> all = leg_hypotheses(recorded_legs_, robot_);
-  for (LegHypothesis& h : foot_link_hypotheses(robot_)) all.push_back(std::move(h));
+  for (LegHypothesis& h : foot_link_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
   const LegHypothesis* best = nullptr;
   LegAcceleration then;
   double least = 1 - well;

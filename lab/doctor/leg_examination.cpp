@@ -246,12 +246,14 @@ bool Examination::try_leg_hypotheses() {
   constexpr double well = 0.008;  // of a description that needs no other
   if (cost < well) return false;
   const LegHypothesis* best = nullptr;
-  double least = std::min(much_better_legs * cost, cost - well);
+  const double enough = std::min(much_better_legs * cost, cost - well);
+  double least = enough;
   const double unexplained = 1 - std::max(described.explained, free.explained), flatness = std::min(described.flatness, free.flatness);
   LegScore score;
   std::vector<LegHypothesis> all = leg_hypotheses(recorded_legs_, robot_);
   // Among so many one fits a little by chance: it has to explain nearly all.
   constexpr double senseless = 0.3, makes_sense = 0.75;  // cost, share
+  constexpr double clearly = 0.85;                       // of the cost that a change of more parts may leave
   const std::size_t plain = all.size();
   if (cost > senseless) {
     for (LegHypothesis& h : gross_leg_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
@@ -264,7 +266,10 @@ bool Examination::try_leg_hypotheses() {
       const LegScore late = score_legs(path, leg_offset_, false);
       if (late.cost() <= other.cost()) other = late;
     }
-    if (other.cost() >= least || other.explained < (static_cast<std::size_t>(&h - all.data()) < plain ? least_explained : makes_sense))
+    // Of two that are about as good, the one that changes less.
+    const double as_good = best == nullptr || h.parts == best->parts ? least : h.parts > best->parts ? clearly * least : least / clearly;
+    if (other.cost() >= std::min(as_good, enough) ||
+        other.explained < (static_cast<std::size_t>(&h - all.data()) < plain ? least_explained : makes_sense))
       continue;
     least = other.cost();
     best = &h;

@@ -8,26 +8,7 @@
 #include <sstream>
 
 namespace kilvo::lab {
-namespace {}  // namespace
-
-std::string other_side(const std::string& name) {
-  constexpr const char* pairs[][2] = {{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"}};
-  for (const auto& pair : pairs) {
-    for (int k = 0; k < 2; ++k) {
-      const std::string from = pair[k], to = pair[1 - k];
-      if (const auto at = name.find(from); at != std::string::npos) return std::string(name).replace(at, from.size(), to);
-    }
-  }
-  if (name.starts_with("l_")) return "r_" + name.substr(2);
-  if (name.starts_with("r_")) return "l_" + name.substr(2);
-  if (name.starts_with("L_")) return "R_" + name.substr(2);
-  if (name.starts_with("R_")) return "L_" + name.substr(2);
-  return name;
-}
-
 namespace {
-
-bool has_side(const std::string& name) { return other_side(name) != name; }
 
 LegHypothesis shifted(const std::vector<std::size_t>& joints, int by) {
   LegHypothesis h;
@@ -58,13 +39,12 @@ std::string scaled(const std::string& urdf, double factor) {
 }
 
 // Two neighbours exchanged in each leg.
-std::vector<LegHypothesis> exchanges(const std::vector<std::size_t>& joints, const std::vector<std::string>& names) {
+std::vector<LegHypothesis> exchanges(const LegSides& sides) {
   std::vector<LegHypothesis> out;
+  const std::vector<std::string> joints = sides.joints_of(0);
   for (std::size_t k = 0; k + 1 < joints.size(); ++k) {
-    const std::string a = names[joints[k]], b = names[joints[k + 1]];
-    const std::string other_a = other_side(a), other_b = other_side(b);
-    // Each pair once, by its first leg.
-    if (other_a == b || (has_side(a) && std::ranges::find(names, other_a) < std::ranges::find(names, a))) continue;
+    const std::string &a = joints[k], &b = joints[k + 1];
+    const std::string other_a = sides.other_joint(a), other_b = sides.other_joint(b);
     LegHypothesis h;
     h.cause = "joints_exchanged";
     h.name = fmt::format("the joints {} and {} are exchanged in the messages, in both legs", a, b);
@@ -84,11 +64,12 @@ std::vector<LegHypothesis> exchanges(const std::vector<std::size_t>& joints, con
 }
 
 // Several joints of one leg, or the same of both, turn the other way round: a leg that is mirrored, axes of another convention.
-std::vector<LegHypothesis> sign_hypotheses(const std::vector<std::size_t>& joints, const std::vector<std::string>& names) {
+std::vector<LegHypothesis> sign_hypotheses(const std::vector<std::size_t>& joints, const std::vector<std::string>& names,
+                                           const LegSides& sides) {
   std::array<std::vector<std::size_t>, 2> legs;
   for (const std::size_t i : joints) {
-    const auto j = static_cast<std::size_t>(std::ranges::find(names, other_side(names[i])) - names.begin());
-    if (j == names.size() || j == i || std::ranges::find(legs[1], i) != legs[1].end()) continue;
+    const auto j = static_cast<std::size_t>(std::ranges::find(names, sides.other_joint(names[i])) - names.begin());
+    if (j == names.size() || j == i || sides.leg_of_joint(names[i]) != 0) continue;
     legs[0].push_back(i);
     legs[1].push_back(j);
   }
@@ -110,6 +91,7 @@ std::vector<LegHypothesis> sign_hypotheses(const std::vector<std::size_t>& joint
       if (turned.size() < 2) continue;  // one by itself is tried anyway
       LegHypothesis h;
       h.cause = "joint_sign";
+      h.parts = turned.size();
       h.name = fmt::format("joints {} turn the other way round", text);
       h.setting = "the axes of these joints in robot.urdf, or their signs in the driver";
       h.position = [turned](std::size_t i, double& q) {
@@ -133,12 +115,12 @@ std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot&
   all.setting = "the axes of the joints in robot.urdf, or their signs in the driver";
   all.position = [](std::size_t, double& q) { q = -q; };
   out.push_back(all);
-  const bool sided = std::ranges::any_of(joints, [&](std::size_t i) { return has_side(names[i]); });
-  for (LegHypothesis& h : sign_hypotheses(joints, names)) out.push_back(std::move(h));
+  const LegSides sides = legs.sides(robot);
+  for (LegHypothesis& h : sign_hypotheses(joints, names, sides)) out.push_back(std::move(h));
   for (std::size_t k = 0; k < joints.size(); ++k) {
     const std::size_t i = joints[k];
     // A joint that both legs hang on turns them as the IMU's mount does.
-    if (sided && !has_side(names[i])) continue;
+    if (!sides.leg_of_joint(names[i])) continue;
     for (const double turn : {90.0, -90.0, 180.0}) {
       LegHypothesis h;
       h.cause = "joint_offset";
@@ -151,7 +133,7 @@ std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot&
     }
     for (std::size_t l = k + 1; l < joints.size(); ++l) {
       const std::string a = names[i], b = names[joints[l]];
-      if (a.substr(0, 2) != b.substr(0, 2)) continue;  // of one leg, as its name begins
+      if (sides.leg_of_joint(a) != sides.leg_of_joint(b)) continue;
       LegHypothesis h;
       h.cause = "joints_exchanged";
       h.name = fmt::format("the joints {} and {} are exchanged in the messages", a, b);
@@ -199,13 +181,14 @@ std::vector<LegHypothesis> leg_hypotheses(RecordedLegs& legs, const Robot& robot
   std::vector<LegHypothesis> out;
   const std::vector<std::size_t> joints = legs.joints_that_matter(robot);
   const auto& names = legs.recorded().joint_names;
-  if (std::ranges::any_of(joints, [&](std::size_t i) { return has_side(names[i]); })) {
+  const LegSides sides = legs.sides(robot);
+  if (!sides.joints_of(0).empty()) {
     LegHypothesis h;
     h.cause = "joints_swapped";
     h.name = "the joints of the left and of the right leg are exchanged in the messages";
     h.setting = "the driver must publish each position under its own joint's name";
-    h.names = [](std::vector<std::string>& all) {
-      for (std::string& name : all) name = other_side(name);
+    h.names = [sides](std::vector<std::string>& all) {
+      for (std::string& name : all) name = sides.other_joint(name);
     };
     out.push_back(h);
   }
@@ -215,9 +198,9 @@ std::vector<LegHypothesis> leg_hypotheses(RecordedLegs& legs, const Robot& robot
     out.push_back(shifted(joints, by));
     if (joints.size() != every.size()) out.push_back(shifted(every, by));
   }
-  for (LegHypothesis& h : exchanges(joints, names)) out.push_back(std::move(h));
+  for (LegHypothesis& h : exchanges(sides)) out.push_back(std::move(h));
   for (const std::string& link : link_names(robot.urdf)) {
-    if (link == robot.imu.link || has_side(link)) continue;
+    if (link == robot.imu.link || sides.leg_of_link(link)) continue;
     LegHypothesis h;
     h.cause = "imu_link";
     h.culprit = Sensor::imu;
@@ -240,16 +223,13 @@ std::vector<LegHypothesis> leg_hypotheses(RecordedLegs& legs, const Robot& robot
   return out;
 }
 
-std::vector<LegHypothesis> foot_link_hypotheses(const Robot& robot) {
+std::vector<LegHypothesis> foot_link_hypotheses(RecordedLegs& legs, const Robot& robot) {
   std::vector<LegHypothesis> out;
-  const std::vector<std::string> links = link_names(robot.urdf);
-  for (const std::string& link : links) {
-    const std::string other = other_side(link);
-    // Each pair once, by its first link; the feet's sides as they are described.
-    if (other == link || link == robot.feet[0].link || other == robot.feet[0].link) continue;
-    if (std::ranges::find(links, other) <= std::ranges::find(links, link) || std::ranges::find(links, other) == links.end()) continue;
-    const bool first = other_side(robot.feet[0].link) == robot.feet[1].link && robot.feet[0].link.substr(0, 2) == link.substr(0, 2);
-    const std::string left = first ? link : other, right = first ? other : link;
+  const LegSides sides = legs.sides(robot);
+  for (const std::string& left : link_names(robot.urdf)) {
+    const std::string right = sides.other_link(left);
+    // Each pair once; the feet's sides as they are described.
+    if (sides.leg_of_link(left) != 0 || right == left || left == robot.feet[0].link) continue;
     LegHypothesis h;
     h.cause = "foot_link";
     h.name = fmt::format("the soles are on links {} and {}, not on {} and {}", left, right, robot.feet[0].link, robot.feet[1].link);
@@ -276,14 +256,6 @@ std::vector<LegHypothesis> size_hypotheses() {
     h.robot = [factor](Robot& r) { r.urdf = scaled(r.urdf, factor); };
     out.push_back(h);
   }
-  return out;
-}
-
-std::vector<std::string> link_names(const std::string& urdf) {
-  constexpr std::size_t most = 200;  // no robot has more, and each is tried
-  std::vector<std::string> out;
-  const std::regex pattern("<link\\s+name\\s*=\\s*\"([^\"]+)\"");
-  for (std::sregex_iterator it(urdf.begin(), urdf.end(), pattern), end; it != end && out.size() < most; ++it) out.push_back((*it)[1]);
   return out;
 }
 

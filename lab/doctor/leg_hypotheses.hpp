@@ -12,9 +12,6 @@ std::vector<LegHypothesis> leg_hypotheses(RecordedLegs& legs, const Robot& robot
 /// otherwise.
 std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot& robot);
 
-/// "left_knee_joint" -> "right_knee_joint"; the same name when it has no side.
-std::string other_side(const std::string& name);
-
 /// Joint positions are in degrees.
 LegHypothesis degrees_hypothesis();
 
@@ -25,7 +22,6 @@ LegHypothesis joined(const LegHypothesis& a, const LegHypothesis& b);
 std::vector<LegHypothesis> size_hypotheses();
 
 /// The soles on other links of both legs.
-std::vector<LegHypothesis> foot_link_hypotheses(const Robot& robot);
-std::vector<std::string> link_names(const std::string& urdf);
+std::vector<LegHypothesis> foot_link_hypotheses(RecordedLegs& legs, const Robot& robot);
 
 }  // namespace kilvo::lab

@@ -177,6 +177,10 @@ bool Examination::accuse_exchanged_legs(double scale, const std::string& evidenc
     if (h.cause != "joints_swapped") continue;
     const LegWay way = measure_leg_way(&h);
     if (!std::isfinite(way.sigma) || std::abs(way.scale - 1) > std::min(scale_tolerance, 0.5 * std::abs(scale - 1))) return false;
+    // Exchanged legs are as long, and turn as well.
+    constexpr double as_well = 0.03;  // of the turning
+    const auto turning = [&](const LegHypothesis* legs) { return score_legs(legs_under(legs), leg_offset_, false).explained; };
+    if (std::abs(way.height.value_or(0)) > leg_height_tolerance || turning(&h) < turning(nullptr) - as_well) return false;
     find({h.culprit,
           h.cause,
           h.name,

@@ -4,10 +4,20 @@
 
 namespace kilvo::lab {
 
+const LinkTree& RecordedLegs::tree(const Robot& robot) {
+  return trees_.try_emplace({robot.urdf, robot.locked_joints}, robot).first->second;
+}
+
 LegKinematics RecordedLegs::kinematics(const Robot& robot) {
-  if (robot.urdf.empty()) return LegKinematics(robot);
-  const auto tree = trees_.try_emplace({robot.urdf, robot.locked_joints}, robot).first;
-  return LegKinematics(robot, false, &tree->second);
+  return robot.urdf.empty() ? LegKinematics(robot) : LegKinematics(robot, false, &tree(robot));
+}
+
+LegSides RecordedLegs::sides(const Robot& robot) {
+  try {
+    return robot.urdf.empty() ? LegSides() : LegSides(tree(robot), robot);
+  } catch (const std::invalid_argument&) {
+    return {};
+  }
 }
 
 std::vector<LegPose> RecordedLegs::path(const Robot& robot, const LegHypothesis* hypothesis, double period, std::string* why) {

@@ -9,6 +9,7 @@
 
 #include "kilvo/legs/joint_chain.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
+#include "lab/doctor/leg_sides.hpp"
 #include "lab/doctor/recorded.hpp"
 #include "lab/doctor/turns.hpp"
 
@@ -20,6 +21,7 @@ struct LegHypothesis {
   std::string setting;  // that mends it
   std::string cause;    // one word
   Sensor culprit = Sensor::legs;
+  std::size_t parts = 1;                                              // that it changes
   std::vector<std::pair<std::string, std::string>> changes;           // settings and values that mend it
   std::function<void(Robot&)> robot;                                  // may be empty
   std::function<void(std::vector<std::string>&)> names;               // may be empty
@@ -42,8 +44,11 @@ class RecordedLegs {
   std::vector<LegPose> path(const Robot& robot, const LegHypothesis* hypothesis, double period, std::string* why);
   /// The joints that move a foot when they turn, by their place in the messages.
   std::vector<std::size_t> joints_that_matter(const Robot& robot);
+  /// None when the URDF cannot be used.
+  LegSides sides(const Robot& robot);
 
  private:
+  const LinkTree& tree(const Robot& robot);
   LegKinematics kinematics(const Robot& robot);
 
   const Recorded& recorded_;

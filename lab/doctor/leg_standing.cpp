@@ -73,7 +73,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   const std::size_t joints = all.size();
   // A link above an ankle that hardly turns stands nearly as well, and on soft ground, in which no sole stands, better: only a link that
   // stands far better, and as feet do.
-  for (LegHypothesis& h : foot_link_hypotheses(robot_)) all.push_back(std::move(h));
+  for (LegHypothesis& h : foot_link_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
   const LegHypothesis* best = nullptr;
   Standing then;
   for (const LegHypothesis& h : all) {

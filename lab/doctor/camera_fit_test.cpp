@@ -1,0 +1,77 @@
+// Corners of a world that is known, followed by a camera whose mount is not.
+#include "lab/doctor/camera_fit.hpp"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <random>
+
+#include "kilvo/vision/camera.hpp"
+
+namespace kilvo::lab {
+namespace camera_fit_test {
+
+constexpr double seconds = 12, period = 0.1;
+
+/// A robot that sways about all axes while it walks.
+Eigen::Vector3d rate(double t) { return {0.3 * std::sin(5 * t), 0.25 * std::cos(6.1 * t), 0.4 * std::sin(1.3 * t)}; }
+
+std::vector<InertialSample> gyro_samples() {
+  std::vector<InertialSample> out;
+  for (double t = -0.2; t < seconds + 0.2; t += 0.005) out.push_back({t, rate(t), Eigen::Vector3d(0, 0, 9.81)});
+  return out;
+}
+
+CameraMount camera() {
+  CameraMount out;
+  out.width = 640, out.height = 480;
+  out.fx = out.fy = 400, out.cx = 320, out.cy = 240;
+  out.T_imu_camera.R = SO3::Exp(Eigen::Vector3d(0.2, -1.1, 1.4));
+  return out;
+}
+
+/// Points 2 to 6 m away, 3 cm of way between two images, 0.2 px of noise.
+std::vector<TrackedPair> tracks(const GyroPath& gyro) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> across(-0.6, 0.6), away(2, 6);
+  std::normal_distribution<double> noise(0, 0.2);
+  const Camera model(camera());
+  const SO3 R_IC = camera().T_imu_camera.R;
+  std::vector<TrackedPair> out;
+  for (double t = 0; t + period < seconds; t += period) {
+    TrackedPair pair{t, t + period, {}};
+    const SO3 R_12 = R_IC.inverse() * SO3::from_quaternion(gyro.between(t, t + period)) * R_IC;
+    const Eigen::Vector3d way = 0.03 * Eigen::Vector3d(std::sin(t), 0.3, std::cos(t));
+    for (int k = 0; k < 40; ++k) {
+      const double z = away(random);
+      const Eigen::Vector3d first(z * across(random), z * across(random), z);
+      const auto a = model.project(first), b = model.project(R_12.inverse() * (first - way));
+      if (!a || !b) continue;
+      const Eigen::Vector2d off(noise(random), noise(random));
+      pair.tracks.push_back({a->cast<float>(), (*b + off).cast<float>()});
+    }
+    out.push_back(std::move(pair));
+  }
+  return out;
+}
+
+TEST(CameraTracks, FindTheRotationWhateverIsDescribed) {
+  const GyroPath gyro(gyro_samples(), Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
+  const std::vector<TrackedPair> seen = tracks(gyro);
+  const CameraTracks cameras(seen, gyro, nullptr);
+  for (const Eigen::Vector3d& turn : {Eigen::Vector3d(1, 1.2, -0.7), Eigen::Vector3d(-2, 0.4, 1.5), Eigen::Vector3d(0.3, 0, 0)}) {
+    CameraMount described = camera();
+    described.T_imu_camera.R = described.T_imu_camera.R * SO3::Exp(turn);
+    const CameraFit fit = cameras.fit_any_rotation({described, 0});
+    ASSERT_TRUE(fit.fit.good);
+    EXPECT_LT((fit.R_IC.inverse() * camera().T_imu_camera.R).Log().norm(), 0.006) << turn.transpose();
+  }
+}
+
+TEST(CameraTracks, OfTheRightMountAreAsFarFromTheirLinesAsTheirNoise) {
+  const GyroPath gyro(gyro_samples(), Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
+  const std::vector<TrackedPair> seen = tracks(gyro);
+  EXPECT_NEAR(CameraTracks(seen, gyro, nullptr).error({camera(), 0}), 0.19, 0.06);
+}
+
+}  // namespace camera_fit_test
+}  // namespace kilvo::lab
