@@ -154,9 +154,10 @@ class Examination {
   void accuse_uneven_legs(double uneven);
   std::optional<double> soles_above_ankles() const;
   std::string link_at_height(double height) const;
+  // camera_hypotheses.cpp
+  bool try_camera_hypotheses(const CameraTracks& tracks);
   // camera_examination.cpp
   void examine_camera();
-  bool try_camera_hypotheses(const CameraTracks& tracks);
   void examine_camera_fit(const CameraTracks& tracks);
   void accuse_camera_rotation(const SO3& R_IC, const std::string& evidence);
   bool accuse_principal_point(const CameraTracks& tracks, const CameraFit& fit);
