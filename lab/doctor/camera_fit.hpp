@@ -20,13 +20,14 @@ class LidarWay {
   /// Pose of the IMU at a time on its own clock; none outside or in gaps.
   std::optional<SE3> at(double t, const GyroPath& gyro) const;
 
- private:
   struct Pose {
     double t;
     SE3 T_WI;
   };
-  void bridge(const Pose& a, const Pose& b, const std::vector<InertialSample>& imu, const GyroPath& gyro, const Eigen::Vector3d& g_W,
-              const Eigen::Vector3d& ba);
+
+ private:
+  void add(std::vector<Pose>& run, const std::vector<InertialSample>& imu, const GyroPath& gyro, const Eigen::Vector3d& g_W,
+           const Eigen::Vector3d& ba);
   std::vector<Pose> poses_;  // at every IMU sample
 };
 

@@ -11,8 +11,8 @@ namespace {
 
 // What an IMU that walks is off by over a tenth of a second, impacts that alias included (docs/decisions/imu-faults.md).
 constexpr double accel_density = 0.013, gyro_density = 4e-4;  // m/s^2 and rad/s per sqrt(Hz)
-constexpr double most_noise = 0.01;    // m, of a sweep's place: more is the accelerometer's, which tells nothing then
-constexpr double longest_step = 0.35;  // s between sweeps
+constexpr double longest_step = 0.35;                         // s between sweeps
+constexpr double longest_pause = 0.05, lost_density = 3;      // s between samples of the IMU; m/s^2 per sqrt(Hz) while there are none
 
 // The acceleration at a time between the sample before `it` and `it`.
 Eigen::Vector3d accel_at(double t, std::vector<InertialSample>::const_iterator it, const std::vector<InertialSample>& imu) {
@@ -22,39 +22,6 @@ Eigen::Vector3d accel_at(double t, std::vector<InertialSample>::const_iterator i
   return (1 - share) * before->accel + share * it->accel;
 }
 
-/// Double integration from `a` to `b`, s, of a body that is at rest in `from` at the beginning; `step(t, place, velocity)` after each
-/// sample.
-template <class Step>
-void integrate(double a, double b, const SE3& from, const std::vector<InertialSample>& imu, const GyroPath& gyro,
-               const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba, Step&& step) {
-  Eigen::Vector3d p = from.p, v = Eigen::Vector3d::Zero();
-  auto it = std::ranges::lower_bound(imu, a, {}, &InertialSample::t);
-  for (double t = a; t < b && it != imu.end(); ++it) {
-    const double next = std::min(it->t, b), dt = next - t;
-    if (!(dt > 0)) continue;
-    const SO3 R = from.R * SO3::from_quaternion(gyro.between(a, 0.5 * (t + next)));
-    const Eigen::Vector3d force = R * Eigen::Vector3d(accel_at(0.5 * (t + next), it, imu) - ba) + g_W;
-    p = p + dt * v + 0.5 * dt * dt * force;
-    v += dt * force;
-    step(next, p, v);
-    t = next;
-  }
-}
-
-/// What the IMU says of the motion from one sweep to the next: place and velocity gained by a body that was at rest.
-struct Increment {
-  Eigen::Vector3d dp = Eigen::Vector3d::Zero(), dv = Eigen::Vector3d::Zero();
-};
-
-Increment increment(double a, double b, const SO3& R_a, const std::vector<InertialSample>& imu, const GyroPath& gyro,
-                    const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
-  Increment out;
-  integrate(a, b, SE3{R_a, Eigen::Vector3d::Zero()}, imu, gyro, g_W, ba, [&](double, const Eigen::Vector3d& p, const Eigen::Vector3d& v) {
-    out = {p, v};
-  });
-  return out;
-}
-
 double median(std::vector<double> x) {
   if (x.empty()) return 0;
   const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
@@ -62,37 +29,106 @@ double median(std::vector<double> x) {
   return *middle;
 }
 
-// Kalman filter and Rauch-Tung-Striebel smoother of a place and its velocity, one axis; with `density` of the velocity's random walk.
-std::vector<double> smooth(const std::vector<double>& z, const std::vector<double>& dt, const std::vector<double>& dp,
-                           const std::vector<double>& dv, double noise, double density) {
-  using Vector = Eigen::Vector2d;
-  using Matrix = Eigen::Matrix2d;
-  const std::size_t n = z.size();
-  std::vector<Vector> x(n), predicted(n);
-  std::vector<Matrix> P(n), before(n), F(n, Matrix::Identity());
-  for (std::size_t k = 0; k < n; ++k) {
-    if (k == 0) {
-      predicted[k] = {z[0], 0};
-      before[k] = Vector(1e2 * noise * noise, 4).asDiagonal();  // m/s: no robot is faster than twice this
-    } else {
-      const double t = dt[k - 1], q = density * density;
-      F[k](0, 1) = t;
-      Matrix Q;
-      Q << q * t * t * t / 3, q * t * t / 2, q * t * t / 2, q * t;
-      predicted[k] = F[k] * x[k - 1] + Vector(dp[k - 1], dv[k - 1]);
-      before[k] = F[k] * P[k - 1] * F[k].transpose() + Q;
-    }
-    const Vector K = before[k].col(0) / (before[k](0, 0) + noise * noise);
-    x[k] = predicted[k] + K * (z[k] - predicted[k][0]);
-    P[k] = before[k] - K * before[k].row(0);
-  }
-  for (std::size_t k = n - 1; k-- > 0;) x[k] += P[k] * F[k + 1].transpose() * before[k + 1].inverse() * (x[k + 1] - predicted[k + 1]);
-  std::vector<double> out;
-  for (const Vector& state : x) out.push_back(state[0]);
-  return out;
+// The random walk of a velocity and its place.
+Eigen::Matrix2d walk(double density, double dt) {
+  Eigen::Matrix2d Q;
+  Q << dt * dt / 3, dt / 2, dt / 2, 1;
+  return density * density * dt * Q;
 }
 
-// The same of a random walk.
+Eigen::Matrix2d transition(double dt) {
+  Eigen::Matrix2d F = Eigen::Matrix2d::Identity();
+  F(0, 1) = dt;
+  return F;
+}
+
+/// From one time to the next: what the IMU says that place and velocity gain, with the variance of an ordinary accelerometer, and with that
+/// of one that fails at peaks, which are clipped and alias: by (|a| / 2 g)^6 m/s^2.
+struct Step {
+  double t = 0, dt = 0;  // s: its end, its length
+  SO3 R;                 // from the IMU frame at its end to the world
+  Eigen::Vector3d dp = Eigen::Vector3d::Zero(), dv = Eigen::Vector3d::Zero();
+  Eigen::Matrix2d ordinary = Eigen::Matrix2d::Zero(), peaks = Eigen::Matrix2d::Zero();
+  bool is_station = false;
+};
+
+// Two steps as one.
+void append(const Step& next, Step& sum) {
+  const Eigen::Matrix2d F = transition(next.dt);
+  sum.t = next.t;
+  sum.R = next.R;
+  sum.dp += next.dt * sum.dv + next.dp;
+  sum.dv += next.dv;
+  sum.ordinary = F * sum.ordinary * F.transpose() + next.ordinary;
+  sum.peaks = F * sum.peaks * F.transpose() + next.peaks;
+  sum.dt += next.dt;
+  sum.is_station = next.is_station;
+}
+
+/// What the accelerometer and the sweeps are off by.
+struct Noise {
+  double ordinary = 1, peaks = 0;  // times those of a step, standard deviation
+  double place = 1e-3;             // m, of a sweep
+};
+
+/// Kalman filter of a place and its velocity, one axis: `z` are the places of the stations.
+struct Filter {
+  std::vector<Eigen::Vector2d> x, predicted;
+  std::vector<Eigen::Matrix2d> P, before;
+  double log_likelihood = 0;
+
+  Filter(const std::vector<Step>& steps, const std::vector<double>& z, const Noise& noise, int axis) {
+    const double R = noise.place * noise.place;
+    x.emplace_back(z[0], 0);
+    P.push_back(Eigen::Vector2d(R, 4).asDiagonal());  // m/s: no robot is faster than twice this
+    predicted = x, before = P;
+    std::size_t station = 0;
+    for (const Step& step : steps) {
+      const Eigen::Matrix2d F = transition(step.dt);
+      predicted.push_back(F * x.back() + Eigen::Vector2d(step.dp[axis], step.dv[axis]));
+      before.push_back(F * P.back() * F.transpose() + noise.ordinary * noise.ordinary * step.ordinary +
+                       noise.peaks * noise.peaks * step.peaks);
+      x.push_back(predicted.back());
+      P.push_back(before.back());
+      if (!step.is_station) continue;
+      const double S = before.back()(0, 0) + R, innovation = z[++station] - predicted.back()[0];
+      const Eigen::Vector2d K = before.back().col(0) / S;
+      x.back() += K * innovation;
+      P.back() -= (K * before.back().row(0)).eval();
+      log_likelihood -= 0.5 * (std::log(S) + innovation * innovation / S);
+    }
+  }
+
+  /// Places, smoothed, at the beginning and the end of each step.
+  std::vector<double> places(const std::vector<Step>& steps) {
+    for (std::size_t k = x.size() - 1; k-- > 0;)
+      x[k] += P[k] * transition(steps[k].dt).transpose() * before[k + 1].inverse() * (x[k + 1] - predicted[k + 1]);
+    std::vector<double> out;
+    for (const Eigen::Vector2d& state : x) out.push_back(state[0]);
+    return out;
+  }
+};
+
+// The noise under which these places are the likeliest. All of it at once: one part after the other ends where the sweeps are blamed for
+// what the accelerometer has missed.
+Noise likeliest(const std::vector<Step>& between, const std::vector<double>& z, int axis) {
+  Noise best;
+  double most = -INFINITY;
+  for (const double place : {5e-4, 1e-3, 2e-3, 5e-3, 1e-2}) {
+    for (const double peaks : {0.0, 0.3, 1.0, 3.0}) {
+      for (const double ordinary : {1.0, 3.0, 10.0}) {
+        const Noise noise{ordinary, peaks, place};
+        const double likelihood = Filter(between, z, noise, axis).log_likelihood;
+        if (likelihood <= most) continue;
+        most = likelihood;
+        best = noise;
+      }
+    }
+  }
+  return best;
+}
+
+// Kalman filter and smoother of a random walk.
 std::vector<double> smooth_walk(const std::vector<double>& z, const std::vector<double>& dt, double noise, double density) {
   const std::size_t n = z.size();
   std::vector<double> x(n, z[0]), P(n, noise * noise), before(n, 0);
@@ -106,18 +142,9 @@ std::vector<double> smooth_walk(const std::vector<double>& z, const std::vector<
   return x;
 }
 
-/// A sweep's pose, of the IMU.
-struct SweepStation {
-  double t;
-  SE3 T_WI;
-};
-
-// The points of a sweep tell its pose to a millimetre, each sweep for itself; the IMU tells to a tenth of that how it moved meanwhile.
-void smooth_stations(std::vector<SweepStation>& run, const std::vector<InertialSample>& imu, const GyroPath& gyro,
-                     const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
+// The sweeps tell rotations to some hundredths of a degree, each for itself; the gyro tells how they differ.
+void smooth_rotations(std::vector<LidarWay::Pose>& run, const GyroPath& gyro) {
   const std::size_t n = run.size();
-  constexpr std::size_t fewest = 8;
-  if (n < fewest || !gyro.covers(run.front().t, run.back().t)) return;
   std::vector<double> dt;
   std::vector<SO3> by_gyro;
   for (std::size_t k = 0; k < n; ++k) {
@@ -134,22 +161,47 @@ void smooth_stations(std::vector<SweepStation>& run, const std::vector<InertialS
     for (std::size_t k = 0; k < n; ++k) turned[k][axis] = z[k];
   }
   for (std::size_t k = 0; k < n; ++k) run[k].T_WI.R = SO3::Exp(turned[k]) * by_gyro[k];
-  std::vector<Increment> moved;
-  for (std::size_t k = 1; k < n; ++k) moved.push_back(increment(run[k - 1].t, run[k].t, run[k - 1].T_WI.R, imu, gyro, g_W, ba));
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> z(n), dp, dv, apart;
-    for (std::size_t k = 0; k < n; ++k) z[k] = run[k].T_WI.p[axis];
-    for (const Increment& i : moved) dp.push_back(i.dp[axis]), dv.push_back(i.dv[axis]);
-    for (std::size_t k = 1; k + 1 < n; ++k) {
-      const double before = (z[k] - z[k - 1] - dp[k - 1]) / dt[k - 1] + dv[k - 1], after = (z[k + 1] - z[k] - dp[k]) / dt[k];
-      apart.push_back(std::abs(after - before) * 0.5 * (dt[k - 1] + dt[k]));
+}
+
+// Sample by sample from the first station to the last.
+std::vector<Step> steps_of(const std::vector<LidarWay::Pose>& run, const std::vector<InertialSample>& imu, const GyroPath& gyro,
+                           const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
+  const double g = g_W.norm();
+  std::vector<Step> out;
+  for (std::size_t k = 1; k < run.size(); ++k) {
+    const double a = run[k - 1].t, b = run[k].t;
+    auto it = std::ranges::lower_bound(imu, a, {}, &InertialSample::t);
+    for (double t = a; t < b;) {
+      const double next = it == imu.end() ? b : std::min(it->t, b), dt = next - t, middle = 0.5 * (t + next);
+      if (dt > 0) {
+        const auto R_at = [&](double at) { return run[k - 1].T_WI.R * SO3::from_quaternion(gyro.between(a, at)); };
+        const Eigen::Vector3d force = R_at(middle) * Eigen::Vector3d((it == imu.end() ? imu.back().accel : accel_at(middle, it, imu)) - ba);
+        const Eigen::Vector3d accel = force + g_W;
+        Step step{next, dt, R_at(next), 0.5 * dt * dt * accel, dt * accel};
+        step.ordinary = walk(dt > longest_pause ? lost_density : accel_density, dt);
+        step.peaks = walk(std::pow(accel.norm() / (2 * g), 6) * std::sqrt(dt), dt);
+        out.push_back(step);
+      }
+      t = next;
+      if (it != imu.end() && it->t <= b) ++it;
     }
-    // Of z[k - 1] - 2 z[k] + z[k + 1].
-    const double noise = 1.48 * median(apart) / std::sqrt(6.0);
-    if (noise > most_noise) continue;
-    z = smooth(z, dt, dp, dv, std::max(1e-4, noise), accel_density);
-    for (std::size_t k = 0; k < n; ++k) run[k].T_WI.p[axis] = z[k];
+    out.back().is_station = true;
   }
+  return out;
+}
+
+std::vector<Step> between_stations(const std::vector<Step>& steps) {
+  std::vector<Step> out;
+  bool begins = true;
+  for (const Step& step : steps) {
+    if (begins) {
+      out.push_back(step);
+    } else {
+      append(step, out.back());
+    }
+    begins = step.is_station;
+  }
+  return out;
 }
 
 }  // namespace
@@ -173,31 +225,28 @@ LidarWay::LidarWay(const std::vector<SweepPose>& poses, const SE3& T_IL, double 
     sweeps.push_back(pose);
   }
   for (std::size_t i = 0, j = 0; i < sweeps.size(); i = j) {
-    std::vector<SweepStation> run;
-    for (j = i; j < sweeps.size() && (j == i || sweeps[j].t - sweeps[j - 1].t < longest_step); ++j)
-      run.push_back({sweeps[j].t, sweeps[j].T_WI});
-    smooth_stations(run, imu, gyro, g_W, ba);
-    for (std::size_t k = 0; k < run.size(); ++k) sweeps[i + k].T_WI = run[k].T_WI;
-  }
-  for (std::size_t i = 1; i < sweeps.size(); ++i) {
-    if (sweeps[i].t - sweeps[i - 1].t < longest_step) bridge(sweeps[i - 1], sweeps[i], imu, gyro, g_W, ba);
+    std::vector<Pose> run;
+    for (j = i; j < sweeps.size() && (j == i || sweeps[j].t - sweeps[j - 1].t < longest_step); ++j) {
+      if (gyro.covers(sweeps[j].t, sweeps[j].t)) run.push_back({sweeps[j].t, sweeps[j].T_WI});
+    }
+    add(run, imu, gyro, g_W, ba);
   }
 }
 
-// Double integration from one sweep to the next; the velocity at its beginning is the one with which it ends where the next sweep says.
-void LidarWay::bridge(const Pose& a, const Pose& b, const std::vector<InertialSample>& imu, const GyroPath& gyro,
-                      const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
-  if (!gyro.covers(a.t, b.t)) return;
-  std::vector<Pose> steps{a};
-  integrate(a.t, b.t, a.T_WI, imu, gyro, g_W, ba, [&](double t, const Eigen::Vector3d& p, const Eigen::Vector3d&) {
-    steps.push_back({t, {a.T_WI.R * SO3::from_quaternion(gyro.between(a.t, t)), p}});
-  });
-  const double span = steps.back().t - a.t;
-  if (!(span > 0) || b.t - steps.back().t > 0.05) return;
-  const Eigen::Vector3d missing = (b.T_WI.p - steps.back().T_WI.p) / span;
-  for (Pose& pose : steps) {
-    pose.T_WI.p += (pose.t - a.t) * missing;
-    if (poses_.empty() || pose.t > poses_.back().t) poses_.push_back(pose);
+// The points of a sweep tell its place to a millimetre, each sweep for itself; the IMU tells to a tenth of that how it moved meanwhile.
+void LidarWay::add(std::vector<Pose>& run, const std::vector<InertialSample>& imu, const GyroPath& gyro, const Eigen::Vector3d& g_W,
+                   const Eigen::Vector3d& ba) {
+  if (run.size() < 2) return;
+  smooth_rotations(run, gyro);
+  const std::vector<Step> steps = steps_of(run, imu, gyro, g_W, ba), between = between_stations(steps);
+  const std::size_t first = poses_.size();
+  poses_.push_back({run[0].t, run[0].T_WI});
+  for (const Step& step : steps) poses_.push_back({step.t, {step.R, Eigen::Vector3d::Zero()}});
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> z;
+    for (const Pose& station : run) z.push_back(station.T_WI.p[axis]);
+    const std::vector<double> places = Filter(steps, z, likeliest(between, z, axis), axis).places(steps);
+    for (std::size_t k = 0; k < places.size(); ++k) poses_[first + k].T_WI.p[axis] = places[k];
   }
 }
 
