@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "lab/doctor/camera_fit.hpp"
+#include "lab/doctor/translation_fit.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -166,7 +167,6 @@ void smooth_rotations(std::vector<LidarWay::Pose>& run, const GyroPath& gyro) {
 // Sample by sample from the first station to the last.
 std::vector<Step> steps_of(const std::vector<LidarWay::Pose>& run, const std::vector<InertialSample>& imu, const GyroPath& gyro,
                            const Eigen::Vector3d& g_W, const Eigen::Vector3d& ba) {
-  const double g = g_W.norm();
   std::vector<Step> out;
   for (std::size_t k = 1; k < run.size(); ++k) {
     const double a = run[k - 1].t, b = run[k].t;
@@ -179,7 +179,7 @@ std::vector<Step> steps_of(const std::vector<LidarWay::Pose>& run, const std::ve
         const Eigen::Vector3d accel = force + g_W;
         Step step{next, dt, R_at(next), 0.5 * dt * dt * accel, dt * accel};
         step.ordinary = walk(dt > longest_pause ? lost_density : accel_density, dt);
-        step.peaks = walk(std::pow(accel.norm() / (2 * g), 6) * std::sqrt(dt), dt);
+        step.peaks = walk(std::pow(accel.norm() / (2 * gravity), 6) * std::sqrt(dt), dt);
         out.push_back(step);
       }
       t = next;
@@ -227,7 +227,8 @@ LidarWay::LidarWay(const std::vector<SweepPose>& poses, const SE3& T_IL, double 
   for (std::size_t i = 0, j = 0; i < sweeps.size(); i = j) {
     std::vector<Pose> run;
     for (j = i; j < sweeps.size() && (j == i || sweeps[j].t - sweeps[j - 1].t < longest_step); ++j) {
-      if (gyro.covers(sweeps[j].t, sweeps[j].t)) run.push_back({sweeps[j].t, sweeps[j].T_WI});
+      const double t = sweeps[j].t;
+      if (gyro.covers(t, t) && (run.empty() || t > run.back().t)) run.push_back({t, sweeps[j].T_WI});
     }
     add(run, imu, gyro, g_W, ba);
   }
