@@ -114,19 +114,19 @@ bool Examination::try_camera_hypotheses(const CameraTracks& tracks) {
     best = error;
     which = &h;
   }
+  const auto evidence_of = [described](double error) {
+    return fmt::format("corners of the images are {:.2f} px from their epipolar lines then, {:.2f} px as described", error, described);
+  };
   // None of these.
   if (best > bad) {
     CameraMount m = robot_.camera;
     m.T_imu_camera.R = tracks.fit_any_rotation({m, 0}).R_IC;
     if (const double error = tracks.error({m, 0}); error < much_better_images * best) {
-      accuse_camera_rotation(
-          m.T_imu_camera.R,
-          fmt::format("corners of the images are {:.2f} px from their epipolar lines then, {:.2f} px as described", error, described));
+      accuse_camera_rotation(m.T_imu_camera.R, evidence_of(error));
       return true;
     }
   }
-  const std::string evidence =
-      fmt::format("corners of the images are {:.2f} px from their epipolar lines then, {:.2f} px as described", best, described);
+  const std::string evidence = evidence_of(best);
   if (which != nullptr) {
     const SO3 before = robot_.camera.T_imu_camera.R;
     robot_.camera = which->mount;
