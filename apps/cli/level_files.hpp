@@ -1,8 +1,8 @@
 // The files of a run in one level world from the first row on: until gravity is known, outputs wait.
 #pragma once
 
+#include <deque>
 #include <optional>
-#include <vector>
 
 #include "apps/cli/held_output.hpp"
 #include "apps/cli/result_files.hpp"
@@ -37,7 +37,7 @@ class LevelFiles {
   std::optional<Time> first_;
   std::optional<SO3> turn_;
   std::optional<Event> event_;
-  std::vector<HeldOutput> waiting_;
+  std::deque<HeldOutput> waiting_;
 };
 
 }  // namespace kilvo::cli

@@ -58,6 +58,14 @@ std::vector<std::string> causes(const Recorded& recorded, const Robot& robot) {
   return out;
 }
 
+void change_points(Recorded& recorded, const std::function<void(Eigen::Vector3f&)>& change) {
+  for (Sweep& sweep : recorded.sweeps) {
+    std::vector<TimedPoint> points = *sweep.points;
+    for (TimedPoint& point : points) change(point.p);
+    sweep.points = std::make_shared<const std::vector<TimedPoint>>(std::move(points));
+  }
+}
+
 SO3 turned(const Eigen::Vector3d& by_degrees) { return SO3::Exp(by_degrees / 57.29577951308232); }
 
 TEST(Doctor, ARightDescriptionIsNotAccused) {
@@ -83,9 +91,7 @@ TEST(Doctor, ALidarThatIsTurnedIsNamedWithItsMount) {
 TEST(Doctor, AMountThatIsOffByItsInverseIsTurnedAndNotInverted) {
   const SO3 Q = turned({0.6, 0, 0});
   Recorded recorded = walked().recorded;
-  for (Sweep& sweep : recorded.sweeps) {
-    for (auto& p : sweep.points) p.p = (Q.matrix() * p.p.cast<double>()).cast<float>();
-  }
+  change_points(recorded, [&Q](Eigen::Vector3f& p) { p = (Q.matrix() * p.cast<double>()).cast<float>(); });
   Robot robot = walked().robot;
   ASSERT_TRUE(robot.lidar.T_imu_lidar.R.matrix().isIdentity(1e-9)) << "so that Q is right";
   robot.lidar.T_imu_lidar.R = Q;
@@ -232,9 +238,7 @@ TEST(Doctor, LegsOfTwoLengthsAreNamed) {
 
 TEST(Doctor, PointsThatAreMirroredAreNoTurnedMount) {
   Recorded recorded = walked().recorded;
-  for (Sweep& sweep : recorded.sweeps) {
-    for (TimedPoint& point : sweep.points) point.p.z() *= -1;
-  }
+  change_points(recorded, [](Eigen::Vector3f& p) { p.z() *= -1; });
   EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("lidar_axes"));
 }
 

@@ -40,7 +40,7 @@ std::optional<double> height_by_lidar(const std::vector<Sweep>& sweeps, const st
   int all = 0;
   for (std::size_t i = 0; i < std::min(way.size(), sweeps.size()); ++i) {
     if (!way[i].good || way[i].t > still_until) continue;
-    for (const TimedPoint& p : sweeps[i].points) {
+    for (const TimedPoint& p : *sweeps[i].points) {
       const Eigen::Vector3d x = way[i].T_WL.R * p.p.cast<double>();
       const double height = up_W.dot(x), along = (x - height * up_W).norm();
       if (height > -0.2 || height < -3.9 || along > 3) continue;

@@ -15,9 +15,10 @@ constexpr float nearest_point = 0.5F;  // m: nearer points may be the robot's ow
 
 Recorded thinned(Recorded recorded, std::size_t step) {
   for (Sweep& sweep : recorded.sweeps) {
-    std::size_t n = 0;
-    for (std::size_t i = 0; i < sweep.points.size(); i += step) sweep.points[n++] = sweep.points[i];
-    sweep.points.resize(n);
+    std::vector<TimedPoint> few;
+    few.reserve(sweep.points->size() / step + 1);
+    for (std::size_t i = 0; i < sweep.points->size(); i += step) few.push_back((*sweep.points)[i]);
+    sweep.points = std::make_shared<const std::vector<TimedPoint>>(std::move(few));
   }
   return recorded;
 }
@@ -58,6 +59,8 @@ void Recorder::take(const LidarScan& scan) {
   Sweep sweep;
   sweep.t = seconds(scan.t);
   const std::size_t step = std::max<std::size_t>(1, scan.points.size() / points_of_a_sweep);
+  std::vector<TimedPoint> points;
+  points.reserve(scan.points.size() / (step | 1U) + 1);
   // A step that shares no factor with the number of lines, so that no line is left out.
   for (std::size_t i = 0; i < scan.points.size(); i += step | 1U) {
     const LidarPoint& p = scan.points[i];
@@ -68,12 +71,13 @@ void Recorder::take(const LidarScan& scan) {
       recorded_.far_points += range > far_away ? 1 : 0;
     }
     if (!(range > nearest_point && range < 200)) continue;
-    sweep.points.push_back({x, 1e-9F * static_cast<float>(p.offset_ns)});
+    points.push_back({x, 1e-9F * static_cast<float>(p.offset_ns)});
   }
-  if (sweep.points.size() < 50) return;
-  const auto [low, high] = std::ranges::minmax(sweep.points, {}, &TimedPoint::t);
+  if (points.size() < 50) return;
+  const auto [low, high] = std::ranges::minmax(points, {}, &TimedPoint::t);
   sweep.begin = sweep.t + static_cast<double>(low.t);
   sweep.end = sweep.t + static_cast<double>(high.t);
+  sweep.points = std::make_shared<const std::vector<TimedPoint>>(std::move(points));
   recorded_.sweeps.push_back(std::move(sweep));
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,7 @@ struct TimedPoint {
 struct Sweep {
   double t = 0;               // s, stamp
   double begin = 0, end = 0;  // s, of the first and the last point
-  std::vector<TimedPoint> points;
+  std::shared_ptr<const std::vector<TimedPoint>> points;  // shared by copies
 };
 
 struct InertialSample {

@@ -159,7 +159,7 @@ class Odometry final : public SweepRegistration {
     if (deskew && span > 1e-4) {
       for (int k = 0; k <= knots; ++k) theta[static_cast<std::size_t>(k)] = lidar_turn(middle, sweep.begin + span * k / knots).Log();
     }
-    for (const TimedPoint& p : sweep.points) {
+    for (const TimedPoint& p : *sweep.points) {
       double t = static_cast<double>(p.t);
       if (deskew_.reversed) t = sum - t;
       const double at = span > 1e-4 ? std::clamp((sweep.t + t - sweep.begin) / span, 0.0, 1.0) * knots : 0;
