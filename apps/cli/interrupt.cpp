@@ -25,4 +25,9 @@ bool InterruptWatch::requested() {
   return true;
 }
 
+bool InterruptWatch::poll() {
+  constexpr unsigned period = 64;
+  return ++polls_ % period == 0 && requested();
+}
+
 }  // namespace kilvo::cli

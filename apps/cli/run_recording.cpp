@@ -140,9 +140,7 @@ class Run {
       estimator_.push(*std::move(measurement), outputs_);
       keep(outputs_);
       progress_.update(input.progress(), [this] { return progress_note(); });
-      // A question costs a system call, as much as half a leg sample.
-      constexpr unsigned period = 64;
-      if ((interrupted = ++asked_ % period == 0 && interrupt_.requested())) break;
+      if ((interrupted = interrupt_.poll())) break;
     }
     input.stop();
     if (stopped_) return false;
@@ -260,7 +258,6 @@ class Run {
   SkeletonFile skeleton_;
   lab::DescriptionWatch description_;
   Progress progress_;
-  unsigned asked_ = 0;
   bool legs_seen_ = false;
   int foreign_legs_ = 0;
 };

@@ -19,8 +19,8 @@ struct TimedPoint {
 };
 
 struct Sweep {
-  double t = 0;               // s, stamp
-  double begin = 0, end = 0;  // s, of the first and the last point
+  double t = 0;                                           // s, stamp
+  double begin = 0, end = 0;                              // s, of the first and the last point
   std::shared_ptr<const std::vector<TimedPoint>> points;  // shared by copies
 };
 
