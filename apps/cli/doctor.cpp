@@ -29,6 +29,7 @@ struct DoctorOptions {
   std::vector<std::string> overrides;
   double start = 0, duration = 60;
   bool json = false;
+  bool exact = false;  // all points of the LiDAR
 };
 
 lab::Recorded record(const DoctorOptions& options, lab::RecordingOptions wanted) {
@@ -36,7 +37,7 @@ lab::Recorded record(const DoctorOptions& options, lab::RecordingOptions wanted)
   wanted.duration = options.duration;
   const auto read = [&options](const lab::RecordingOptions& what) {
     lab::RecordingSource source(options.input, what);
-    lab::Recorder recorder(what.leg_clock.has_value());
+    lab::Recorder recorder(what.leg_clock.has_value(), options.exact);
     while (const auto measurement = source.next()) recorder.push(*measurement);
     return recorder.finish();
   };
@@ -126,6 +127,7 @@ Judged mend_first(DoctorOptions& options, std::vector<lab::Finding>& mended) {
 }
 
 int calibrate(DoctorOptions options) {
+  options.exact = true;
   if (!options.report.empty()) prepare_folder(options.report);
   lab::Calibration page{options.input, options.config, {}, {}, {}};
   const Judged judged = mend_first(options, page.mended);

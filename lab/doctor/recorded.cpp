@@ -58,7 +58,7 @@ void Recorder::take(const LidarScan& scan) {
   if (scan.points.empty()) return;
   Sweep sweep;
   sweep.t = seconds(scan.t);
-  const std::size_t step = std::max<std::size_t>(1, scan.points.size() / points_of_a_sweep);
+  const std::size_t step = recorded_.has_all_points ? 1 : std::max<std::size_t>(1, scan.points.size() / points_of_a_sweep);
   std::vector<TimedPoint> points;
   points.reserve(scan.points.size() / (step | 1U) + 1);
   // A step that shares no factor with the number of lines, so that no line is left out.

@@ -55,6 +55,7 @@ struct Recorded {
   std::array<StampStatistics, sensor_count> stamps;
   bool joint_names_change = false;
   bool leg_clock_is_found = false;  // by the program (legs.clock): the legs' stamps are no part of the description
+  bool has_all_points = false;      // of the sweeps: they are to be registered as exactly as they can be
 };
 
 /// With every so many points of each sweep left.
@@ -63,7 +64,11 @@ Recorded thinned(Recorded recorded, std::size_t step);
 /// Takes measurements in the order in which they arrive.
 class Recorder {
  public:
-  explicit Recorder(bool leg_clock_is_found = false) { recorded_.leg_clock_is_found = leg_clock_is_found; }
+  /// `all_points`: of each sweep (16 bytes each), else some thousand. For a calibration.
+  explicit Recorder(bool leg_clock_is_found = false, bool all_points = false) {
+    recorded_.leg_clock_is_found = leg_clock_is_found;
+    recorded_.has_all_points = all_points;
+  }
   void push(const Measurement& measurement);
   /// Everything so far, sorted.
   Recorded finish();

@@ -12,10 +12,11 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double fine = 0.5, coarse = 2;  // m, sides of voxels
-constexpr double far = 8;                 // m, beyond which points go to the coarse grid only
-constexpr double sensor_noise = 0.02;     // m
-constexpr double gate = 0.5;              // m
+constexpr double fine = 0.5, exact_fine = 0.7, coarse = 2;  // m, sides of voxels
+constexpr double far = 8;                                 // m, beyond which points go to the coarse grid only
+constexpr double grazing = 0.3;                           // cosine of the incidence
+constexpr double sensor_noise = 0.02;                     // m
+constexpr double gate = 0.5;                              // m
 constexpr int sweep_iterations = 10;
 constexpr std::size_t stride = 4;        // of the points of a sweep, those that are registered
 constexpr std::size_t least_used = 500;  // of them, where there are as many
@@ -86,6 +87,8 @@ double middle_of(const Sweep& sweep) { return 0.5 * (sweep.begin + sweep.end); }
 
 class Odometry final : public SweepRegistration {
  public:
+  explicit Odometry(bool exact) : exact_(exact), fine_(exact ? exact_fine : fine) {}
+
   SweepPose step(const Sweep& sweep, const Deskew& deskew) override {
     deskew_ = deskew;
     const double middle = middle_of(sweep);
@@ -186,7 +189,7 @@ class Odometry final : public SweepRegistration {
       std::vector<double> distances;
       rows_.clear();
       const Eigen::Matrix3d R = pose.T_WL.R.matrix(), back = R.transpose();
-      const std::size_t step = std::clamp<std::size_t>(points_.size() / least_used, 1, stride);
+      const std::size_t step = exact_ ? 1 : std::clamp<std::size_t>(points_.size() / least_used, 1, stride);
       for (std::size_t i = 0; i < points_.size(); i += step) {
         const Point& p = points_[i];
         const Eigen::Vector3d arm = R * p.p;
@@ -194,7 +197,7 @@ class Odometry final : public SweepRegistration {
         const GridPlane* plane = plane_at(at, p.p.norm());
         if (plane == nullptr) continue;
         const double r = plane->n.dot(at - plane->centre);
-        if (std::abs(r) > gate) continue;
+        if (std::abs(r) > gate || (exact_ && std::abs(plane->n.dot(arm)) < grazing * arm.norm())) continue;
         distances.push_back(std::abs(r));
         const double noise = plane->variance + sensor_noise * sensor_noise;
         const double weight = 1 / (noise * (1 + r * r / (4 * (scale * scale + noise))));
@@ -255,7 +258,8 @@ class Odometry final : public SweepRegistration {
     double dt;
   };
   Deskew deskew_;
-  PlaneGrid fine_{fine}, coarse_{coarse};
+  bool exact_;
+  PlaneGrid fine_, coarse_{coarse};
   std::vector<Point> points_;
   std::vector<Row> rows_;                    // of one iteration
   std::vector<Eigen::Vector3d> near_, all_;  // points of a sweep in the first sweep's frame
@@ -271,14 +275,14 @@ void ScanOdometry::extend(const std::vector<Sweep>& sweeps, const Deskew& deskew
   const std::size_t before = way_.size();
   const bool follow = before > 0 && before <= sweeps.size() && middle_of(sweeps[before - 1]) == way_.back().t;
   if (!follow) {
-    registration_ = std::make_unique<Odometry>();
+    registration_ = std::make_unique<Odometry>(deskew.exact);
     way_.clear();
   }
   while (way_.size() < sweeps.size()) way_.push_back(registration_->step(sweeps[way_.size()], deskew));
 }
 
 std::vector<SweepPose> scan_odometry(const std::vector<Sweep>& sweeps, const Deskew& deskew, OdometryRange range) {
-  Odometry odometry;
+  Odometry odometry(deskew.exact);
   std::vector<SweepPose> out;
   for (std::size_t i = range.begin; i < std::min(range.end, sweeps.size()); ++i) out.push_back(odometry.step(sweeps[i], deskew));
   return out;

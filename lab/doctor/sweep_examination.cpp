@@ -96,6 +96,7 @@ void Examination::examine_point_times() {
                        fit ? fit->g_W : Eigen::Vector3d::Zero(), fit ? fit->ba : Eigen::Vector3d::Zero());
   deskew.way = swung.empty() ? nullptr : &swung;
   deskew.p_IL = T_IL.p;
+  deskew.exact = recorded_.has_all_points;
   earlier_.swung.extend(recorded_.sweeps, deskew);
   way_ = earlier_.swung.way();
 }
