@@ -13,10 +13,10 @@ namespace kilvo::lab {
 namespace {
 
 constexpr double fine = 0.5, exact_fine = 0.7, coarse = 2;  // m, sides of voxels
-constexpr double far = 8;                                 // m, beyond which points go to the coarse grid only
-constexpr double grazing = 0.3;                           // cosine of the incidence
-constexpr double sensor_noise = 0.02;                     // m
-constexpr double gate = 0.5;                              // m
+constexpr double far = 8;                                   // m, beyond which points go to the coarse grid only
+constexpr double grazing = 0.3;                             // cosine of the incidence
+constexpr double sensor_noise = 0.02;                       // m
+constexpr double gate = 0.5;                                // m
 constexpr int sweep_iterations = 10;
 constexpr std::size_t stride = 4;        // of the points of a sweep, those that are registered
 constexpr std::size_t least_used = 500;  // of them, where there are as many
