@@ -14,7 +14,7 @@ namespace {
 
 constexpr double fine = 0.5, exact_fine = 0.7, coarse = 2;  // m, sides of voxels
 constexpr double far = 8;                                   // m, beyond which points go to the coarse grid only
-constexpr double grazing = 0.3;                             // cosine of the incidence
+constexpr double grazing = 0.3;                             // cosine of the incidence, below which an exact way uses no point
 constexpr double sensor_noise = 0.02;                       // m
 constexpr double gate = 0.5;                                // m
 constexpr int sweep_iterations = 10;

@@ -31,7 +31,7 @@ struct Deskew {
   bool reversed = false;          // hypothesis: the points' times run backwards within a sweep
   const LidarWay* way = nullptr;  // none: constant velocity within a sweep
   Eigen::Vector3d p_IL = Eigen::Vector3d::Zero();
-  // Every point is registered, to planes of more of a wall, and none at grazing incidence, where ranges are wrong: ten times as long.
+  // Every point is registered, to planes of more of a wall, and none at grazing incidence, where ranges are wrong: several times as long.
   bool exact = false;
 };
 
