@@ -126,7 +126,7 @@ class Player {
                               : peer_.writer("rt/joint_states", "sensor_msgs::msg::dds_::JointState_", false);
     if (only.find("lidar") != std::string::npos) lidar_ = peer_.writer("rt/points", "sensor_msgs::msg::dds_::PointCloud2_", true);
     if (only.find("camera") != std::string::npos) camera_ = peer_.writer("rt/camera/image_raw", "sensor_msgs::msg::dds_::Image_", true);
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    wait_for_readers();
   }
 
   void play() {
@@ -156,6 +156,21 @@ class Player {
     options.start = std::stod(words.option("--start", "0"));
     options.duration = std::stod(words.option("--seconds", "1e9"));
     return options;
+  }
+
+  /// What is sent before both sides have found each other is lost, and a busy machine may need seconds for that. A topic that nobody
+  /// reads costs the whole wait.
+  void wait_for_readers() {
+    const auto end = Wall::now() + std::chrono::seconds(10);
+    for (DataWriter* writer : {imu_, legs_, lidar_, camera_}) {
+      PublicationMatchedStatus status;
+      while (writer != nullptr && Wall::now() < end) {
+        writer->get_publication_matched_status(status);
+        if (status.current_count > 0) break;
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      }
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));  // the reader's side
   }
 
   void send(const Measurement& m) {
