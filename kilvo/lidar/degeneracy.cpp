@@ -12,31 +12,119 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-// How far, in radians, the planes of the map may be wrong about a direction that they do not hold.
-constexpr double direction_error = 1e-2;
+// Sweeps in a row that see the same planes and err alike.
+constexpr double alike = 10;
 
 // Scales rotation to metres at the lever of the points: d_scaled = (lever * theta, p).
 Vector6 to_metres(double lever) { return (Vector6() << lever, lever, lever, 1, 1, 1).finished(); }
 
-}  // namespace
+// Of (rotation, position): the rotation to another frame.
+Matrix6 rotated(const Eigen::Matrix3d& R) {
+  Matrix6 out = Matrix6::Identity();
+  out.topLeftCorner<3, 3>() = R;
+  return out;
+}
 
-Degeneracy find_degeneracy(const Matrix6& A, const Matrix6& fake, double weak_share) {
+Matrix6 scaled(const Matrix6& A, double lever) {
+  const Vector6 to_own = to_metres(lever).cwiseInverse();
+  return to_own.asDiagonal() * A * to_own.asDiagonal();
+}
+
+// The sweep along the eigenvectors of `usual`.
+Degeneracy decompose(const SweepInformation& sweep, const Matrix6& usual, double weak_share) {
   Degeneracy out;
-  const double rotation = A.topLeftCorner<3, 3>().trace(), position = A.bottomRightCorner<3, 3>().trace();
-  if (!(position > 0) || !(rotation > 0)) return out;
-  out.lever = std::sqrt(rotation / position);
-  const Vector6 to_own = to_metres(out.lever).cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Matrix6> eig(to_own.asDiagonal() * A * to_own.asDiagonal());
-  const Matrix6 faked = to_own.asDiagonal() * fake * to_own.asDiagonal();
+  out.position = sweep.A.bottomRightCorner<3, 3>().trace();
+  out.lever = std::sqrt(sweep.A.topLeftCorner<3, 3>().trace() / out.position);
+  const Matrix6 own = scaled(sweep.A, out.lever), faked = scaled(sweep.fake, out.lever);
+  const Eigen::SelfAdjointEigenSolver<Matrix6> eig(scaled(usual, out.lever));
   for (int k = 0; k < 6; ++k) {
     const Vector6 u = eig.eigenvectors().col(k);
     // Twice the expected part: what is left of a faked direction scatters around zero.
-    const double real = eig.eigenvalues()[k] - 2.0 * u.dot(faked * u);
-    out.smallest_share = std::min(out.smallest_share, real / position);
-    if (real >= weak_share * position) continue;
-    out.real[out.weak_count] = std::max(0.0, real);
-    out.weak.col(out.weak_count++) = u;
+    const double real = u.dot(own * u) - 2.0 * u.dot(faked * u);
+    out.smallest_share = std::min(out.smallest_share, real / out.position);
+    if (real >= weak_share * out.position) {
+      out.known.col(out.known_count++) = u;
+    } else {
+      out.real[out.weak_count] = real;
+      out.weak.col(out.weak_count++) = u;
+    }
   }
+  return out;
+}
+
+// Noise E of A turns an eigenvector u towards another one v by v'Eu / (difference of the eigenvalues). E of n planes that are alike has a
+// variance of (information along v) * (faked information along u) / n there. `last`: the directions that the sweep before left out.
+void doubt_directions(const SweepInformation& sweep, const Matrix6& last, Degeneracy& d) {
+  const Matrix6 own = scaled(sweep.A, d.lever), faked = scaled(sweep.fake, d.lever);
+  for (int k = 0; k < d.weak_count; ++k) {
+    const Vector6 u = d.weak.col(k), before = last * (last.transpose() * u);
+    for (int j = 0; j < d.known_count; ++j) {
+      const Vector6 v = d.known.col(j);
+      const double information = v.dot(own * v), difference = information - u.dot(own * u);
+      if (!(difference > 0)) continue;
+      const double noise = alike * information * u.dot(faked * u) / (std::max(1, sweep.planes) * difference * difference);
+      const double of_sweep = v.dot(own * u) / difference, since_last = v.dot(before);
+      d.doubt(j, k) = noise + of_sweep * of_sweep + since_last * since_last;
+    }
+  }
+}
+
+}  // namespace
+
+void BlindDirections::see(const SweepInformation& sweep, const Degeneracy& d) {
+  if (d.weak_count == 0) *this = {};
+  if (d.turned) sweeps_ = 0;
+  mean_ = rotated(sweep.R_WI) * mean_with(sweep) * rotated(sweep.R_WI).transpose();
+  sweeps_ = std::min(sweeps_ + 1, 100);
+  part_ = weak_part(d);
+  last_ = rotated(sweep.R_WI) * to_metres(d.lever).cwiseInverse().asDiagonal() * d.weak;
+  last_count_ = d.weak_count;
+  for (int k = 0; k < 6; ++k) {
+    RunningStatistics& share = share_[static_cast<std::size_t>(k)];
+    if (k < d.weak_count) {
+      share.add(d.real[k] / d.position, 1);
+    } else {
+      share = none();
+    }
+  }
+}
+
+void BlindDirections::see_nothing() {
+  *this = {};
+  part_.setIdentity();
+}
+
+Matrix6 BlindDirections::mean_with(const SweepInformation& sweep) const {
+  const Matrix6 own = sweep.A / sweep.A.bottomRightCorner<3, 3>().trace();
+  return (sweeps_ * rotated(sweep.R_WI).transpose() * mean_ * rotated(sweep.R_WI) + own) / (sweeps_ + 1);
+}
+
+Matrix6 BlindDirections::last(int count, const Eigen::Matrix3d& R_WI, double lever) const {
+  if (count != last_count_) return Matrix6::Zero();
+  Matrix6 out = to_metres(lever).asDiagonal() * rotated(R_WI).transpose() * last_;
+  for (int k = 0; k < count; ++k) out.col(k).normalize();
+  return out;
+}
+
+double BlindDirections::confirmed_share(int k) const {
+  const RunningStatistics& share = share_[static_cast<std::size_t>(k)];
+  return std::max(0.0, share.mean() - std::sqrt(alike / memory) * share.sigma());
+}
+
+Degeneracy find_degeneracy(const SweepInformation& sweep, double weak_share, const BlindDirections& before) {
+  Degeneracy out;
+  if (!(sweep.A.topLeftCorner<3, 3>().trace() > 0) || !(sweep.A.bottomRightCorner<3, 3>().trace() > 0)) return out;
+  out = decompose(sweep, sweep.A, weak_share);
+  if (out.weak_count == 0) return out;
+  Degeneracy usual = decompose(sweep, before.mean_with(sweep), weak_share);
+  usual.turned = usual.weak_count < out.weak_count;
+  if (usual.turned) {
+    out.turned = true;
+  } else {
+    out = usual;
+  }
+  doubt_directions(sweep, before.last(out.weak_count, sweep.R_WI, out.lever), out);
+  for (int k = 0; k < out.weak_count; ++k) out.kept[k] = std::min(std::max(0.0, out.real[k]), before.confirmed_share(k) * out.position);
   return out;
 }
 
@@ -50,27 +138,26 @@ void project_out(const Degeneracy& d, const PoseCovariance& prior, bool alone, I
   if (d.weak_count == 0) return;
   const Vector6 metres = to_metres(d.lever), to_own = metres.cwiseInverse();
   const Matrix6 P = metres.asDiagonal() * prior * metres.asDiagonal();
-  Matrix6 A = to_own.asDiagonal() * info.A * to_own.asDiagonal();
+  Matrix6 A = scaled(info.A, d.lever);
   Vector6 b = to_own.asDiagonal() * info.b;
-  double across_variance = 0;
+  Matrix6 across = Matrix6::Zero();
   Matrix6 kept_A = Matrix6::Zero();
   Vector6 kept_b = Vector6::Zero();
   for (int k = 0; k < d.weak_count; ++k) {
     const Vector6 u = d.weak.col(k);
     if (const double whole = u.dot(A * u); alone && whole > 0) {
-      // Faked rows see no error: of all rows, b = real * error, with the noise of all. The sweeps after see the same planes and err alike.
-      constexpr double alike = 10;  // sweeps
-      const double attenuation = std::min(1.0, d.real[k] / whole);
-      kept_A += d.real[k] * attenuation / alike * u * u.transpose();
+      // Faked rows see no error: of all rows, b = real * error, with the noise of all.
+      const double attenuation = std::min(1.0, d.kept[k] / whole);
+      kept_A += d.kept[k] * attenuation / alike * u * u.transpose();
       kept_b += attenuation / alike * u.dot(b) * u;
     }
     const Matrix6 keep = Matrix6::Identity() - u * u.transpose();
     A = (keep * A * keep).eval();
     b = (keep * b).eval();
-    across_variance += direction_error * direction_error * u.dot(P * u);
+    across += u.dot(P * u) * d.known * d.doubt.col(k).asDiagonal() * d.known.transpose();
   }
-  // Noise common to all rows: (A^-1 + v I)^-1 = (I + v A)^-1 A.
-  const auto common = (Matrix6::Identity() + across_variance * A).partialPivLu();
+  // Noise common to all rows: (A^-1 + V)^-1 = (I + A V)^-1 A.
+  const auto common = (Matrix6::Identity() + A * across).partialPivLu();
   A = common.solve(A).eval();
   b = common.solve(b).eval();
   info.A = metres.asDiagonal() * (0.5 * (A + A.transpose()) + kept_A) * metres.asDiagonal();

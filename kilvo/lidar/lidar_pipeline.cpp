@@ -80,7 +80,7 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
   // With hysteresis: each change of mind would hand what was drifted since to the map.
   constexpr double to_leave = 3.0;
   if (is_blind_somewhere()) config.weak_share *= to_leave;
-  LidarModel model(map, out.clusters, mount_.T_imu_lidar.p, context.map_error, config, workers_);
+  LidarModel model(map, out.clusters, mount_.T_imu_lidar.p, context.map_error, config, workers_, &blind_);
   if (context.alone) model.keep_weak();
   if (map.empty()) {
     out.carries = true;
@@ -144,11 +144,15 @@ void LidarPipeline::search(const VoxelMap& map, const Estimate& prior, LidarMode
 }
 
 void LidarPipeline::accept(const Registration& sweep) {
-  unobservable_ = sweep.carries ? weak_part(sweep.report.degeneracy) : PoseCovariance::Identity();
+  if (sweep.carries) {
+    blind_.see(sweep.report.information, sweep.report.degeneracy);
+  } else {
+    blind_.see_nothing();
+  }
   if (!sweep.searched) searched_since_.reset();
   if (sweep.searched && !searched_since_) searched_since_ = sweep.posterior.t;
   // What a sweep does not hold that had to be found may be for its smear: it is searched for again, for a while.
-  if (!searched_since_ || sweep.posterior.t - *searched_since_ > longest_refusal) unknowable_ = unobservable_;
+  if (!searched_since_ || sweep.posterior.t - *searched_since_ > longest_refusal) unknowable_ = blind_.part();
   refused_since_.reset();
 }
 
@@ -183,7 +187,8 @@ bool LidarPipeline::refuse(Time t, bool map_is_given) {
   if (!refused_since_) refused_since_ = t;
   rejoin();
   if (map_is_given || t - *refused_since_ < longest_refusal) return false;
-  unobservable_ = unknowable_ = PoseCovariance::Zero();
+  blind_ = {};
+  unknowable_.setZero();
   refused_since_.reset();
   sweeps_to_go_ = 0;
   return true;

@@ -97,8 +97,8 @@ class LidarPipeline {
   PoseCovariance mount_error_at(const SE3& T_WI) const { return mount_error_.at(T_WI); }
 
   /// Takes a pose error to its part along what the last sweep did not know.
-  const PoseCovariance& unobservable() const { return unobservable_; }
-  bool is_blind_somewhere() const { return !unobservable_.isZero(0); }
+  const PoseCovariance& unobservable() const { return blind_.part(); }
+  bool is_blind_somewhere() const { return blind_.any(); }
 
  private:
   static constexpr int consistent_sweeps = 3;
@@ -114,8 +114,8 @@ class LidarPipeline {
   TimeOffset time_offset_;
   MountError mount_error_;
   RangeNoise range_noise_;
-  PoseCovariance unobservable_ = PoseCovariance::Zero();
-  PoseCovariance unknowable_ = PoseCovariance::Zero();  // of it what is for the world around: it is not searched for
+  BlindDirections blind_;
+  PoseCovariance unknowable_ = PoseCovariance::Zero();  // of what the last sweep did not know what is for the world around: it is not searched for
   double usual_change_ = 0;                             // mean of squared changes by sweeps, per covariance of the prior
   int expected_sweeps_ = 0;                             // in a row, that were where they usually are
   int sweeps_to_go_ = 0;                                // consistent sweeps before the map grows again

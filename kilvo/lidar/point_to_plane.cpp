@@ -39,7 +39,7 @@ PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, cons
 }
 
 LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL,
-                       const PoseCovariance& map_error, const LidarConfig& config, const Workers& workers)
+                       const PoseCovariance& map_error, const LidarConfig& config, const Workers& workers, const BlindDirections* blind)
     : map_(map),
       clusters_(clusters),
       p_IL_(p_IL),
@@ -48,7 +48,8 @@ LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> cluste
       workers_(workers),
       places_(clusters.size()),
       associations_(clusters.size()),
-      plane_of_node_(map.node_capacity(), no_index) {
+      plane_of_node_(map.node_capacity(), no_index),
+      blind_(blind) {
   rows_of_plane_.reserve(clusters.size());
 }
 
@@ -230,7 +231,10 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   info.rows = sums.rows;
   report_.matched = info.rows;
   report_.chi2_per_row = info.rows > 0 ? info.chi2 / info.rows : 0;
-  if (first_) report_.degeneracy = find_degeneracy(info.A, sums.fake.selfadjointView<Eigen::Lower>(), config_.weak_share);
+  if (first_) {
+    report_.information = {info.A, sums.fake.selfadjointView<Eigen::Lower>(), static_cast<int>(rows_of_plane_.size()), T_WI.R.matrix()};
+    report_.degeneracy = find_degeneracy(report_.information, config_.weak_share, blind_ != nullptr ? *blind_ : BlindDirections{});
+  }
   first_ = false;
   project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), keeps_weak_, info);
   return info;

@@ -27,6 +27,7 @@ struct RegistrationReport {
   int matched = 0;   // rows used
   int rejected = 0;  // had a plane but failed the gate
   double chi2_per_row = 0;
+  SweepInformation information;  // of the first evaluation
   Degeneracy degeneracy;
 };
 
@@ -36,7 +37,7 @@ class LidarModel {
   /// Keeps references: the map, the clusters and the workers must outlive it. `map_error`: covariance of the pose from the map's own error,
   /// by which the gate is wider than the filter's covariance says.
   LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const PoseCovariance& map_error,
-             const LidarConfig& config, const Workers& workers);
+             const LidarConfig& config, const Workers& workers, const BlindDirections* blind = nullptr);
 
   /// Nothing else measures what the sweep hardly holds: what of it is not faked is kept.
   void keep_weak() { keeps_weak_ = true; }
@@ -91,6 +92,7 @@ class LidarModel {
   std::vector<Association> associations_;
   std::vector<std::uint32_t> plane_of_node_;  // place in rows_of_plane_; of nodes that have one while rows are counted
   std::vector<std::uint16_t> rows_of_plane_;  // of the last evaluation
+  const BlindDirections* blind_;
   bool first_ = true, keeps_weak_ = false;
   RegistrationReport report_;
 };
