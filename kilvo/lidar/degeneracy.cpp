@@ -30,9 +30,16 @@ Matrix6 scaled(const Matrix6& A, double lever) {
   return to_own.asDiagonal() * A * to_own.asDiagonal();
 }
 
+struct Decomposition {
+  Degeneracy degeneracy;
+  Matrix6 known = Matrix6::Zero();  // the directions that are not weak
+  int known_count = 0;
+};
+
 // The sweep along the eigenvectors of `usual`.
-Degeneracy decompose(const SweepInformation& sweep, const Matrix6& usual, double weak_share) {
-  Degeneracy out;
+Decomposition decompose(const SweepInformation& sweep, const Matrix6& usual, double weak_share) {
+  Decomposition all;
+  Degeneracy& out = all.degeneracy;
   out.position = sweep.A.bottomRightCorner<3, 3>().trace();
   out.lever = std::sqrt(sweep.A.topLeftCorner<3, 3>().trace() / out.position);
   const Matrix6 own = scaled(sweep.A, out.lever), faked = scaled(sweep.fake, out.lever);
@@ -43,29 +50,34 @@ Degeneracy decompose(const SweepInformation& sweep, const Matrix6& usual, double
     const double real = u.dot(own * u) - 2.0 * u.dot(faked * u);
     out.smallest_share = std::min(out.smallest_share, real / out.position);
     if (real >= weak_share * out.position) {
-      out.known.col(out.known_count++) = u;
+      all.known.col(all.known_count++) = u;
     } else {
       out.real[out.weak_count] = real;
       out.weak.col(out.weak_count++) = u;
     }
   }
-  return out;
+  return all;
 }
 
 // Noise E of A turns an eigenvector u towards another one v by v'Eu / (difference of the eigenvalues). E of n planes that are alike has a
 // variance of (information along v) * (faked information along u) / n there. `last`: the directions that the sweep before left out.
-void doubt_directions(const SweepInformation& sweep, const Matrix6& last, Degeneracy& d) {
+void doubt_directions(const SweepInformation& sweep, const Matrix6& last, Decomposition& all) {
+  Degeneracy& d = all.degeneracy;
   const Matrix6 own = scaled(sweep.A, d.lever), faked = scaled(sweep.fake, d.lever);
   for (int k = 0; k < d.weak_count; ++k) {
     const Vector6 u = d.weak.col(k), before = last * (last.transpose() * u);
-    for (int j = 0; j < d.known_count; ++j) {
-      const Vector6 v = d.known.col(j);
+    Matrix6& doubt = d.doubt[static_cast<std::size_t>(k)];
+    Vector6 of_sweep = Vector6::Zero(), since_last = Vector6::Zero();
+    doubt.setZero();
+    for (int j = 0; j < all.known_count; ++j) {
+      const Vector6 v = all.known.col(j);
       const double information = v.dot(own * v), difference = information - u.dot(own * u);
       if (!(difference > 0)) continue;
-      const double noise = alike * information * u.dot(faked * u) / (std::max(1, sweep.planes) * difference * difference);
-      const double of_sweep = v.dot(own * u) / difference, since_last = v.dot(before);
-      d.doubt(j, k) = noise + of_sweep * of_sweep + since_last * since_last;
+      doubt += alike * information * u.dot(faked * u) / (std::max(1, sweep.planes) * difference * difference) * v * v.transpose();
+      of_sweep += v.dot(own * u) / difference * v;
+      since_last += v.dot(before) * v;
     }
+    doubt += of_sweep * of_sweep.transpose() + since_last * since_last.transpose();
   }
 }
 
@@ -75,7 +87,7 @@ void BlindDirections::see(const SweepInformation& sweep, const Degeneracy& d) {
   if (d.weak_count == 0) *this = {};
   if (d.turned) sweeps_ = 0;
   mean_ = rotated(sweep.R_WI) * mean_with(sweep) * rotated(sweep.R_WI).transpose();
-  sweeps_ = std::min(sweeps_ + 1, 100);
+  sweeps_ = std::min(sweeps_ + 1, direction_memory);
   part_ = weak_part(d);
   last_ = rotated(sweep.R_WI) * to_metres(d.lever).cwiseInverse().asDiagonal() * d.weak;
   last_count_ = d.weak_count;
@@ -106,25 +118,18 @@ Matrix6 BlindDirections::last(int count, const Eigen::Matrix3d& R_WI, double lev
   return out;
 }
 
-double BlindDirections::confirmed_share(int k) const {
-  const RunningStatistics& share = share_[static_cast<std::size_t>(k)];
-  return std::max(0.0, share.mean() - std::sqrt(alike / memory) * share.sigma());
-}
-
 Degeneracy find_degeneracy(const SweepInformation& sweep, double weak_share, const BlindDirections& before) {
-  Degeneracy out;
-  if (!(sweep.A.topLeftCorner<3, 3>().trace() > 0) || !(sweep.A.bottomRightCorner<3, 3>().trace() > 0)) return out;
-  out = decompose(sweep, sweep.A, weak_share);
+  if (!(sweep.A.topLeftCorner<3, 3>().trace() > 0) || !(sweep.A.bottomRightCorner<3, 3>().trace() > 0)) return {};
+  Decomposition all = decompose(sweep, sweep.A, weak_share);
+  Degeneracy& out = all.degeneracy;
   if (out.weak_count == 0) return out;
-  Degeneracy usual = decompose(sweep, before.mean_with(sweep), weak_share);
-  usual.turned = usual.weak_count < out.weak_count;
-  if (usual.turned) {
-    out.turned = true;
+  if (Decomposition usual = decompose(sweep, before.mean_with(sweep), weak_share); usual.degeneracy.weak_count >= out.weak_count) {
+    all = std::move(usual);
   } else {
-    out = usual;
+    out.turned = true;
   }
-  doubt_directions(sweep, before.last(out.weak_count, sweep.R_WI, out.lever), out);
-  for (int k = 0; k < out.weak_count; ++k) out.kept[k] = std::min(std::max(0.0, out.real[k]), before.confirmed_share(k) * out.position);
+  doubt_directions(sweep, before.last(out.weak_count, sweep.R_WI, out.lever), all);
+  for (int k = 0; k < out.weak_count; ++k) out.kept[k] = std::clamp(before.mean_share(k) * out.position, 0.0, std::max(0.0, out.real[k]));
   return out;
 }
 
@@ -154,7 +159,7 @@ void project_out(const Degeneracy& d, const PoseCovariance& prior, bool alone, I
     const Matrix6 keep = Matrix6::Identity() - u * u.transpose();
     A = (keep * A * keep).eval();
     b = (keep * b).eval();
-    across += u.dot(P * u) * d.known * d.doubt.col(k).asDiagonal() * d.known.transpose();
+    across += u.dot(P * u) * d.doubt[static_cast<std::size_t>(k)];
   }
   // Noise common to all rows: (A^-1 + V)^-1 = (I + A V)^-1 A.
   const auto common = (Matrix6::Identity() + A * across).partialPivLu();

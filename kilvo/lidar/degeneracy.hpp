@@ -14,18 +14,17 @@ namespace kilvo {
 struct SweepInformation {
   Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 6> fake = Eigen::Matrix<double, 6, 6>::Zero();  // expected, from the normals' own noise: sum of cov(J) / sigma^2
-  int planes = 0;                                                         // whose noise is independent
+  int planes = 0;                                                          // whose noise is independent
   Eigen::Matrix3d R_WI = Eigen::Matrix3d::Identity();
 };
 
 /// Directions are unit vectors in columns, scaled (rotation * lever, position).
 struct Degeneracy {
   Eigen::Matrix<double, 6, 6> weak = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 6> known = Eigen::Matrix<double, 6, 6>::Zero();  // the others
-  Eigen::Matrix<double, 6, 1> real = Eigen::Matrix<double, 6, 1>::Zero();   // information along each weak one without the faked, 1/m^2
-  Eigen::Matrix<double, 6, 1> kept = Eigen::Matrix<double, 6, 1>::Zero();   // of it what the sweeps before confirm
-  Eigen::Matrix<double, 6, 6> doubt = Eigen::Matrix<double, 6, 6>::Zero();  // rad^2: by how much a weak one (column) may be turned to a known one
-  int weak_count = 0, known_count = 0;
+  Eigen::Matrix<double, 6, 1> real = Eigen::Matrix<double, 6, 1>::Zero();  // information along each weak one without the faked, 1/m^2
+  Eigen::Matrix<double, 6, 1> kept = Eigen::Matrix<double, 6, 1>::Zero();  // of it what the sweeps before have as well
+  std::array<Eigen::Matrix<double, 6, 6>, 6> doubt;  // rad^2: covariance of each weak direction, of the first weak_count
+  int weak_count = 0;
   double lever = 1;           // m per rad
   double position = 0;        // information on all three of position, 1/m^2
   double smallest_share = 1;  // of the weakest direction, after subtraction, in `position`
@@ -48,11 +47,13 @@ class BlindDirections {
   Eigen::Matrix<double, 6, 6> mean_with(const SweepInformation& sweep) const;
   /// The last sweep's directions, scaled; none if it had another number of them.
   Eigen::Matrix<double, 6, 6> last(int count, const Eigen::Matrix3d& R_WI, double lever) const;
-  /// The share of `position` that a weak direction really has: the mean less its standard error. A single sweep's scatters around zero.
-  double confirmed_share(int k) const;
+  /// Mean of Degeneracy::real / position of the k-th weak direction, -: that of a single sweep scatters around zero, and what is taken of
+  /// it wherever it is positive holds the robot back.
+  double mean_share(int k) const { return share_[static_cast<std::size_t>(k)].mean(); }
 
  private:
-  static constexpr double memory = 30;  // sweeps
+  static constexpr double memory = 30;          // sweeps, of the shares
+  static constexpr int direction_memory = 100;  // sweeps, of where the weak directions point
 
   Eigen::Matrix<double, 6, 6> part_ = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 6> mean_ = Eigen::Matrix<double, 6, 6>::Zero();  // of A / position, rotation in the world

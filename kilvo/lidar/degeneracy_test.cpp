@@ -108,21 +108,26 @@ TEST(Degeneracy, FakedInformationDoesNotCount) {
   // A measures x only by what noisy normals fake.
   Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Identity() * 1e6, fake = Eigen::Matrix<double, 6, 6>::Zero();
   A(3, 3) = fake(3, 3) = 1e5;
-  EXPECT_EQ(find_degeneracy(A, Eigen::Matrix<double, 6, 6>::Zero(), 0.002).weak_count, 0);
-  const Degeneracy d = find_degeneracy(A, fake, 0.002);
+  EXPECT_EQ(find_degeneracy({A, Eigen::Matrix<double, 6, 6>::Zero()}, 0.002, {}).weak_count, 0);
+  const Degeneracy d = find_degeneracy({A, fake}, 0.002, {});
   ASSERT_EQ(d.weak_count, 1);
   EXPECT_NEAR(std::abs(d.weak(3, 0)), 1, 1e-9);
 }
 
 // b of an error along x is what real rows make of it; faked rows see none of it.
-TEST(Degeneracy, AloneWhatIsNotFakedIsKeptAndTellsTheWholeError) {
+TEST(Degeneracy, AloneWhatSweepsConfirmIsKeptAndTellsTheWholeError) {
   constexpr double real = 800, faked = 100, error = 0.02;
   Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Identity() * 1e6, fake = Eigen::Matrix<double, 6, 6>::Zero();
   A(3, 3) = real + 2 * faked;
   fake(3, 3) = faked;
-  const Degeneracy d = find_degeneracy(A, fake, 0.002);
+  BlindDirections before;
+  Degeneracy d = find_degeneracy({A, fake}, 0.002, before);
   ASSERT_EQ(d.weak_count, 1);
   EXPECT_NEAR(d.real[0], real, 1e-6);
+  EXPECT_EQ(d.kept[0], 0) << "the first one is confirmed by none";
+  before.see({A, fake}, d);
+  d = find_degeneracy({A, fake}, 0.002, before);
+  EXPECT_NEAR(d.kept[0], real, 1e-6);
   const auto projected = [&](bool alone) {
     Information<6> info;
     info.A = A;
@@ -136,9 +141,85 @@ TEST(Degeneracy, AloneWhatIsNotFakedIsKeptAndTellsTheWholeError) {
   EXPECT_NEAR(kept.A(3, 3), real * real / (real + 2 * faked) / 10, 1e-6) << "ten sweeps err alike";
 }
 
+// A sweep in a tunnel along `axis`: planes all around it whose normals are off by the noise of `tilt` rad each.
+SweepInformation sweep_in_tunnel(const Eigen::Vector3d& axis, double tilt, test::Random& random) {
+  constexpr int planes = 300;
+  constexpr double weight = 1e4;  // 1/m^2, of a row
+  const Eigen::Vector3d side = axis.unitOrthogonal(), up = axis.cross(side);
+  SweepInformation out;
+  out.planes = planes;
+  for (int i = 0; i < planes; ++i) {
+    const double angle = random.uniform(0, 6.28);
+    const Eigen::Vector3d normal = std::cos(angle) * side + std::sin(angle) * up, across = axis.cross(normal);
+    const Eigen::Vector3d p = random.uniform(-8, 8) * axis + random.uniform(-1, 1) * across + 1.5 * normal;
+    const auto row = [&p](const Eigen::Vector3d& n) { return (Eigen::Matrix<double, 6, 1>() << p.cross(n), n).finished(); };
+    const Eigen::Matrix<double, 6, 1> J = row(normal + random.normal(tilt) * axis + random.normal(tilt) * across);
+    out.A += weight * J * J.transpose();
+    for (const Eigen::Vector3d& n : {axis, across}) out.fake += weight * tilt * tilt * row(n) * row(n).transpose();
+  }
+  return out;
+}
+
+// Nothing measures along the tunnel: what is uncertain there stays so, however often it is looked at.
+TEST(Degeneracy, SweepsInARowDoNotLearnWhatNoneOfThemMeasures) {
+  test::Random random(3);
+  BlindDirections blind;
+  PoseCovariance P = PoseCovariance::Identity() * 1e-8;
+  P.bottomRightCorner<3, 3>().setIdentity();
+  for (int i = 0; i < 500; ++i) {
+    const SweepInformation sweep = sweep_in_tunnel(x_axis, 0.01, random);
+    const Degeneracy d = find_degeneracy(sweep, 0.002, blind);
+    ASSERT_EQ(d.weak_count, 1);
+    Information<6> info;
+    info.A = sweep.A;
+    project_out(d, P, true, info);
+    P = (P.inverse() + info.A).inverse().eval();
+    P.diagonal().array() += 1e-8;
+    blind.see(sweep, d);
+  }
+  EXPECT_GT(std::sqrt(P(3, 3)), 0.5) << "0.02 when each sweep finds the direction by itself";
+  EXPECT_LT(std::sqrt(P(4, 4)), 0.01);
+  EXPECT_LT(std::sqrt(P(5, 5)), 0.01);
+}
+
+TEST(Degeneracy, ABendTurnsTheWeakDirection) {
+  test::Random random(4);
+  BlindDirections blind;
+  const auto see = [&](const Eigen::Vector3d& axis) {
+    const SweepInformation sweep = sweep_in_tunnel(axis, 0.01, random);
+    const Degeneracy d = find_degeneracy(sweep, 0.002, blind);
+    blind.see(sweep, d);
+    return d;
+  };
+  for (int i = 0; i < 50; ++i) see(x_axis);
+  const Eigen::Vector3d bent = SO3::Exp({0, 0, 0.2}) * x_axis;
+  const Degeneracy d = see(bent);
+  EXPECT_TRUE(d.turned);
+  EXPECT_LT(d.weak.col(0).tail<3>().cross(bent).norm(), 0.01);
+  // What is uncertain along the old one does not look measured from the new one.
+  Eigen::Matrix<double, 6, 1> across = Eigen::Matrix<double, 6, 1>::Zero();
+  across.tail<3>() = z_axis.cross(bent);
+  EXPECT_NEAR(across.dot(d.doubt[0] * across), 0.04, 0.01);
+}
+
+TEST(Degeneracy, AShareThatScattersAroundZeroIsNotKept) {
+  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Identity() * 1e6, fake = Eigen::Matrix<double, 6, 6>::Zero();
+  fake(3, 3) = 1000;
+  BlindDirections blind;
+  double kept = 0;
+  for (int i = 0; i < 200; ++i) {
+    A(3, 3) = 2000 + (i % 2 == 0 ? 900 : -900);
+    const Degeneracy d = find_degeneracy({A, fake}, 0.002, blind);
+    ASSERT_EQ(d.weak_count, 1);
+    blind.see({A, fake}, d);
+    kept += d.kept[0] / 200;
+  }
+  EXPECT_LT(kept, 60) << "of 900 in every second sweep";
+}
+
 TEST(Degeneracy, WithoutAnyInformationNothingBreaks) {
   const Eigen::Matrix<double, 6, 6> none = Eigen::Matrix<double, 6, 6>::Zero();
-  const Degeneracy d = find_degeneracy(none, none, 0.002);
+  const Degeneracy d = find_degeneracy({none, none}, 0.002, {});
   Information<6> info;
   project_out(d, none, false, info);
   EXPECT_TRUE(info.A.allFinite());
@@ -151,6 +232,7 @@ TEST(Degeneracy, ProjectingOutLeavesNothingAlongTheWeakDirectionInAnyUnits) {
   d.lever = 3;
   d.weak.col(0) = random.vector<6>().normalized();
   d.weak_count = 1;
+  d.doubt[0].setZero();
   Information<6> info;
   info.A = 1e6 * random.covariance<6>(1);
   info.b = 1e3 * random.vector<6>();
