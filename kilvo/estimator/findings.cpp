@@ -155,6 +155,23 @@ void Findings::report_turned_camera(const Situation& now, const Eigen::Vector3d&
          tenths(degrees.x()) + ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()));
 }
 
+void Findings::note_unmeasured(const Situation& now, const std::optional<Eigen::Vector3d>& along) {
+  if (!along) {
+    unmeasured_.since.reset();
+    unmeasured_.reported = false;
+    return;
+  }
+  if (!unmeasured_.since) unmeasured_.since = now.t;
+  const Duration lasted = now.t - *unmeasured_.since;
+  if (lasted < 3 * streams_period) return;
+  unmeasured_.stretches += unmeasured_.reported ? 0 : 1;
+  unmeasured_.reported = true;
+  unmeasured_.longest = std::max(unmeasured_.longest, to_seconds(lasted));
+  const auto axis = [&along](int i) { return decimals(std::abs((*along)[i]) < 0.05 ? 0.0 : (*along)[i], 1); };  // no "-0.0"
+  events_.state({now.t, Sensor::lidar, Reason::unmeasured, unmeasured_.longest, unmeasured_.stretches,
+                 "(" + axis(0) + ", " + axis(1) + ", " + axis(2) + ")"});
+}
+
 void Findings::report_new_map(const Situation& now) {
   ++statistics_.maps_begun_anew;
   report(now, Sensor::lidar, Reason::map_begun_anew);

@@ -45,6 +45,8 @@ class Findings {
   void report_turned_camera(const Situation& now, const Eigen::Vector3d& turned);
   /// No sweep had fitted for so long that the map was restarted.
   void report_new_map(const Situation& now);
+  /// A sweep was registered. `along`: a direction of the position that neither it nor another sensor measured, none if all are.
+  void note_unmeasured(const Situation& now, const std::optional<Eigen::Vector3d>& along);
   /// `a` and `b` contradict each other.
   void contradict(Reason reason, Sensor a, Sensor b, double value, const std::string& why, const Situation& now);
   /// Which other sensor carried the estimate until now.
@@ -88,6 +90,13 @@ class Findings {
   };
   std::optional<Biases> first_biases_, known_biases_;  // at the start; when they were known
   bool strange_biases_ = false;
+  struct Unmeasured {
+    std::optional<Time> since;
+    bool reported = false;  // this stretch
+    double longest = 0;     // s
+    std::uint64_t stretches = 0;
+  };
+  Unmeasured unmeasured_;
   std::uint64_t lost_stances_before_ = 0;
 };
 

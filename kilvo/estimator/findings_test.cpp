@@ -128,6 +128,19 @@ TEST_F(Judged, LegsThatNeverStandStillAreEvidenceAgainstTheLidar) {
   EXPECT_THAT(warnings(), ElementsAre(AllOf(HasSubstr("the legs and the LiDAR contradict each other"), HasSubstr("4 times"))));
 }
 
+TEST_F(Judged, ADirectionThatNothingMeasuresIsReportedWithItsLongestStretch) {
+  const auto corridor_from = [this](double begin, double end) {
+    const bool blind = s_ > begin && s_ < end;
+    findings_.note_unmeasured(situation(), blind ? std::optional(Eigen::Vector3d(0.6, 0.8, 0)) : std::nullopt);
+  };
+  walk(10, [&] { corridor_from(3, 5); });
+  EXPECT_THAT(warnings(), IsEmpty()) << "a short one";
+  walk(40, [&] { corridor_from(s_ < 30 ? 12 : 31, s_ < 30 ? 25 : 37); });
+  ASSERT_EQ(warnings().size(), 1U);
+  EXPECT_THAT(warnings()[0], HasSubstr("for 11 s no sensor measured the motion along (0.6, 0.8, 0.0)"));
+  EXPECT_THAT(warnings()[0], HasSubstr("(2 times)"));
+}
+
 TEST_F(Judged, AnEpochThatBeginsIsInnocent) {
   const auto speed = [this] { estimate_.x.v = {8.3, 0, 0}; };
   walk(3, speed);

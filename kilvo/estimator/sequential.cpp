@@ -19,6 +19,14 @@ std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE
   return out;
 }
 
+// Of the part that a sweep did not know: a direction of the position in it.
+std::optional<Eigen::Vector3d> direction_of(const PoseCovariance& part) {
+  const Eigen::Matrix3d position = part.bottomRightCorner<3, 3>();
+  Eigen::Index most = 0;
+  if (position.diagonal().maxCoeff(&most) < 1.0 / 3) return std::nullopt;
+  return position.col(most).normalized();
+}
+
 }  // namespace
 
 void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, std::vector<Output>& out) {
@@ -74,6 +82,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
                                     input_.robot().lidar.time_offset);
     history_.correct_trajectory(sweep.posterior, sweep.posterior.x.v - prior.x.v);
     lidar_.accept(sweep);
+    findings_.note_unmeasured(situation(), alone ? direction_of(lidar_.unobservable()) : std::nullopt);
     if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior, alone);
     if (first) map_.begin_at(T_WI, legs_.description_error(sweep.posterior.x));
     if (first && moving_start_) map_.begin_at(T_WI, moving_start_->error_at(T_WI));

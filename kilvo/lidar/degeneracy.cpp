@@ -30,52 +30,41 @@ Matrix6 scaled(const Matrix6& A, double lever) {
   return to_own.asDiagonal() * A * to_own.asDiagonal();
 }
 
-struct Decomposition {
-  Degeneracy degeneracy;
-  Matrix6 known = Matrix6::Zero();  // the directions that are not weak
-  int known_count = 0;
-};
-
 // The sweep along the eigenvectors of `usual`.
-Decomposition decompose(const SweepInformation& sweep, const Matrix6& usual, double weak_share) {
-  Decomposition all;
-  Degeneracy& out = all.degeneracy;
+Degeneracy decompose(const SweepInformation& sweep, const Matrix6& usual, double weak_share) {
+  Degeneracy out;
   out.position = sweep.A.bottomRightCorner<3, 3>().trace();
   out.lever = std::sqrt(sweep.A.topLeftCorner<3, 3>().trace() / out.position);
   const Matrix6 own = scaled(sweep.A, out.lever), faked = scaled(sweep.fake, out.lever);
   const Eigen::SelfAdjointEigenSolver<Matrix6> eig(scaled(usual, out.lever));
   for (int k = 0; k < 6; ++k) {
     const Vector6 u = eig.eigenvectors().col(k);
-    // Twice the expected part: what is left of a faked direction scatters around zero.
+    // What is left of a faked direction scatters around zero.
     const double real = u.dot(own * u) - 2.0 * u.dot(faked * u);
     out.smallest_share = std::min(out.smallest_share, real / out.position);
-    if (real >= weak_share * out.position) {
-      all.known.col(all.known_count++) = u;
-    } else {
-      out.real[out.weak_count] = real;
-      out.weak.col(out.weak_count++) = u;
-    }
+    const bool weak = real < weak_share * out.position;
+    if (weak) out.real[static_cast<std::size_t>(out.weak_count)] = real;
+    out.directions.col(weak ? out.weak_count++ : 5 - (k - out.weak_count)) = u;
   }
-  return all;
+  return out;
 }
 
 // Noise E of A turns an eigenvector u towards another one v by v'Eu / (difference of the eigenvalues). E of n planes that are alike has a
-// variance of (information along v) * (faked information along u) / n there. `last`: the directions that the sweep before left out.
-void doubt_directions(const SweepInformation& sweep, const Matrix6& last, Decomposition& all) {
-  Degeneracy& d = all.degeneracy;
+// variance of (information along v) * (faked information along u) / n there. `last`: projects to what the sweep before left out.
+void doubt_directions(const SweepInformation& sweep, const Matrix6& last, Degeneracy& d) {
   const Matrix6 own = scaled(sweep.A, d.lever), faked = scaled(sweep.fake, d.lever);
   for (int k = 0; k < d.weak_count; ++k) {
-    const Vector6 u = d.weak.col(k), before = last * (last.transpose() * u);
+    const Vector6 u = d.directions.col(k);
     Matrix6& doubt = d.doubt[static_cast<std::size_t>(k)];
     Vector6 of_sweep = Vector6::Zero(), since_last = Vector6::Zero();
     doubt.setZero();
-    for (int j = 0; j < all.known_count; ++j) {
-      const Vector6 v = all.known.col(j);
+    for (int j = d.weak_count; j < 6; ++j) {
+      const Vector6 v = d.directions.col(j);
       const double information = v.dot(own * v), difference = information - u.dot(own * u);
       if (!(difference > 0)) continue;
       doubt += alike * information * u.dot(faked * u) / (std::max(1, sweep.planes) * difference * difference) * v * v.transpose();
       of_sweep += v.dot(own * u) / difference * v;
-      since_last += v.dot(before) * v;
+      since_last += v.dot(last * u) * v;
     }
     doubt += of_sweep * of_sweep.transpose() + since_last * since_last.transpose();
   }
@@ -84,26 +73,15 @@ void doubt_directions(const SweepInformation& sweep, const Matrix6& last, Decomp
 }  // namespace
 
 void BlindDirections::see(const SweepInformation& sweep, const Degeneracy& d) {
-  if (d.weak_count == 0) *this = {};
+  if (d.weak_count == 0) {
+    *this = {};
+    return;
+  }
   if (d.turned) sweeps_ = 0;
   mean_ = rotated(sweep.R_WI) * mean_with(sweep) * rotated(sweep.R_WI).transpose();
-  sweeps_ = std::min(sweeps_ + 1, direction_memory);
+  sweeps_ = std::min(sweeps_ + 1, memory);
   part_ = weak_part(d);
-  last_ = rotated(sweep.R_WI) * to_metres(d.lever).cwiseInverse().asDiagonal() * d.weak;
-  last_count_ = d.weak_count;
-  for (int k = 0; k < 6; ++k) {
-    RunningStatistics& share = share_[static_cast<std::size_t>(k)];
-    if (k < d.weak_count) {
-      share.add(d.real[k] / d.position, 1);
-    } else {
-      share = none();
-    }
-  }
-}
-
-void BlindDirections::see_nothing() {
-  *this = {};
-  part_.setIdentity();
+  share_.add(d.smallest_share, 1);
 }
 
 Matrix6 BlindDirections::mean_with(const SweepInformation& sweep) const {
@@ -111,31 +89,25 @@ Matrix6 BlindDirections::mean_with(const SweepInformation& sweep) const {
   return (sweeps_ * rotated(sweep.R_WI).transpose() * mean_ * rotated(sweep.R_WI) + own) / (sweeps_ + 1);
 }
 
-Matrix6 BlindDirections::last(int count, const Eigen::Matrix3d& R_WI, double lever) const {
-  if (count != last_count_) return Matrix6::Zero();
-  Matrix6 out = to_metres(lever).asDiagonal() * rotated(R_WI).transpose() * last_;
-  for (int k = 0; k < count; ++k) out.col(k).normalize();
-  return out;
-}
-
 Degeneracy find_degeneracy(const SweepInformation& sweep, double weak_share, const BlindDirections& before) {
   if (!(sweep.A.topLeftCorner<3, 3>().trace() > 0) || !(sweep.A.bottomRightCorner<3, 3>().trace() > 0)) return {};
-  Decomposition all = decompose(sweep, sweep.A, weak_share);
-  Degeneracy& out = all.degeneracy;
+  Degeneracy out = decompose(sweep, sweep.A, weak_share);
   if (out.weak_count == 0) return out;
-  if (Decomposition usual = decompose(sweep, before.mean_with(sweep), weak_share); usual.degeneracy.weak_count >= out.weak_count) {
-    all = std::move(usual);
-  } else {
-    out.turned = true;
-  }
-  doubt_directions(sweep, before.last(out.weak_count, sweep.R_WI, out.lever), all);
-  for (int k = 0; k < out.weak_count; ++k) out.kept[k] = std::clamp(before.mean_share(k) * out.position, 0.0, std::max(0.0, out.real[k]));
+  const Degeneracy usual = decompose(sweep, before.mean_with(sweep), weak_share);
+  out.turned = usual.weak_count < out.weak_count;
+  if (!out.turned) out = usual;
+  // What has become known since the last sweep was measured.
+  const Vector6 metres = to_metres(out.lever);
+  Matrix6 last = metres.asDiagonal() * before.part() * metres.cwiseInverse().asDiagonal();
+  if (last.trace() > out.weak_count + 0.5) last.setZero();
+  doubt_directions(sweep, last, out);
+  for (std::size_t k = 0; k < 6; ++k) out.kept[k] = std::clamp(before.mean_share() * out.position, 0.0, std::max(0.0, out.real[k]));
   return out;
 }
 
 Matrix6 weak_part(const Degeneracy& d) {
   const Vector6 metres = to_metres(d.lever);
-  return metres.cwiseInverse().asDiagonal() * (d.weak.leftCols(d.weak_count) * d.weak.leftCols(d.weak_count).transpose()) *
+  return metres.cwiseInverse().asDiagonal() * (d.directions.leftCols(d.weak_count) * d.directions.leftCols(d.weak_count).transpose()) *
          metres.asDiagonal();
 }
 
@@ -149,17 +121,18 @@ void project_out(const Degeneracy& d, const PoseCovariance& prior, bool alone, I
   Matrix6 kept_A = Matrix6::Zero();
   Vector6 kept_b = Vector6::Zero();
   for (int k = 0; k < d.weak_count; ++k) {
-    const Vector6 u = d.weak.col(k);
+    const Vector6 u = d.directions.col(k);
+    const auto i = static_cast<std::size_t>(k);
     if (const double whole = u.dot(A * u); alone && whole > 0) {
       // Faked rows see no error: of all rows, b = real * error, with the noise of all.
-      const double attenuation = std::min(1.0, d.kept[k] / whole);
-      kept_A += d.kept[k] * attenuation / alike * u * u.transpose();
+      const double attenuation = std::min(1.0, d.kept[i] / whole);
+      kept_A += d.kept[i] * attenuation / alike * u * u.transpose();
       kept_b += attenuation / alike * u.dot(b) * u;
     }
     const Matrix6 keep = Matrix6::Identity() - u * u.transpose();
     A = (keep * A * keep).eval();
     b = (keep * b).eval();
-    across += u.dot(P * u) * d.doubt[static_cast<std::size_t>(k)];
+    across += u.dot(P * u) * d.doubt[i];
   }
   // Noise common to all rows: (A^-1 + V)^-1 = (I + A V)^-1 A.
   const auto common = (Matrix6::Identity() + A * across).partialPivLu();

@@ -69,6 +69,7 @@ enum class Reason : std::uint8_t {
   gyro_clipped,
   accel_clipped,
   feet_not_still,
+  unmeasured,
   map_begun_anew,
   state_thrown_away,
   foreign_images,
@@ -155,6 +156,11 @@ inline constexpr std::array reasons = {
     ReasonRow{Reason::accel_clipped, Severity::warning, "accel_clipped", "the accelerometer is at the end of its range, {} m/s^2", 1, 1},
     ReasonRow{Reason::feet_not_still, Severity::warning, "feet_not_still",
               "no foot was at rest in {} % of the messages: check the mount of the IMU and the URDF", 100, 0},
+    ReasonRow{
+        Reason::unmeasured, Severity::warning, "unmeasured",
+        "for {} s no sensor measured the motion along [] of the odometry frame: the position along it is integrated from the IMU, and "
+        "drifts. Legs or a camera would measure it",
+        1, 0},
     ReasonRow{Reason::map_begun_anew, Severity::error, "map_begun_anew",
               "the map was restarted, because no sweep fitted it: poses before and after are in different frames"},
     ReasonRow{Reason::state_thrown_away, Severity::warning, "state_thrown_away",
