@@ -115,7 +115,7 @@ TEST(MovingStart, AGapOfTheImuMeanwhileIsOvercome) {
 TEST(MovingStart, SweepsThatComeLateBeginAsWell) {
   const Walk walk = walk_from(3, 5, [](Measurement& m, double s) { return !std::holds_alternative<LidarScan>(m) || s > 2.6; });
   EXPECT_FALSE(walk.statistics.diverged);
-  EXPECT_LT(walk.worst, 0.035);
+  EXPECT_LT(walk.worst, 0.03);
   EXPECT_LT(walk.worst_in_sigmas, 4) << walk.worst_of_all << " m";
 }
 

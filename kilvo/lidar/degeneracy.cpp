@@ -73,10 +73,7 @@ void doubt_directions(const SweepInformation& sweep, const Matrix6& last, Degene
 }  // namespace
 
 void BlindDirections::see(const SweepInformation& sweep, const Degeneracy& d) {
-  if (d.weak_count == 0) {
-    *this = {};
-    return;
-  }
+  if (d.weak_count == 0) return void(*this = {});
   if (d.turned) sweeps_ = 0;
   mean_ = rotated(sweep.R_WI) * mean_with(sweep) * rotated(sweep.R_WI).transpose();
   sweeps_ = std::min(sweeps_ + 1, memory);
@@ -101,7 +98,8 @@ Degeneracy find_degeneracy(const SweepInformation& sweep, double weak_share, con
   Matrix6 last = metres.asDiagonal() * before.part() * metres.cwiseInverse().asDiagonal();
   if (last.trace() > out.weak_count + 0.5) last.setZero();
   doubt_directions(sweep, last, out);
-  for (std::size_t k = 0; k < 6; ++k) out.kept[k] = std::clamp(before.mean_share() * out.position, 0.0, std::max(0.0, out.real[k]));
+  for (std::size_t k = 0; k < 6; ++k)
+    out.kept[k] = std::clamp(before.mean_share_with(out.smallest_share) * out.position, 0.0, std::max(0.0, out.real[k]));
   return out;
 }
 

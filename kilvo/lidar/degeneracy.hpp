@@ -41,13 +41,16 @@ class BlindDirections {
   const PoseCovariance& part() const { return part_; }
   /// Mean of the sweeps' A per Degeneracy::position, `sweep` included.
   PoseCovariance mean_with(const SweepInformation& sweep) const;
-  /// Mean of Degeneracy::smallest_share: that of a single sweep scatters around zero, and what is taken of it wherever it is positive holds
-  /// the robot back.
-  double mean_share() const { return share_.mean(); }
+  /// Mean of Degeneracy::smallest_share, `share` of a sweep included: that of a single one scatters around zero, and what is taken of it
+  /// wherever it is positive holds the robot back.
+  double mean_share_with(double share) const {
+    RunningStatistics with = share_;
+    with.add(share, 1);
+    return with.mean();
+  }
 
  private:
-  static constexpr int memory = 30;  // sweeps
-
+  static constexpr int memory = 30;                                               // sweeps
   PoseCovariance part_ = PoseCovariance::Zero(), mean_ = PoseCovariance::Zero();  // the mean with the rotation in the world
   RunningStatistics share_{0, 0, 0, memory};
   int sweeps_ = 0;

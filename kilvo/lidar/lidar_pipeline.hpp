@@ -115,13 +115,12 @@ class LidarPipeline {
   MountError mount_error_;
   RangeNoise range_noise_;
   BlindDirections blind_;
-  PoseCovariance unknowable_ =
-      PoseCovariance::Zero();           // of what the last sweep did not know what is for the world around: it is not searched for
-  double usual_change_ = 0;             // mean of squared changes by sweeps, per covariance of the prior
-  int expected_sweeps_ = 0;             // in a row, that were where they usually are
-  int sweeps_to_go_ = 0;                // consistent sweeps before the map grows again
-  std::optional<Time> refused_since_;   // sweeps that fit nowhere
-  std::optional<Time> searched_since_;  // sweeps that had to be found
+  PoseCovariance unknowable_ = PoseCovariance::Zero();  // of blind_.part() what is for the world around: it is not searched for
+  double usual_change_ = 0;                             // mean of squared changes by sweeps, per covariance of the prior
+  int expected_sweeps_ = 0;                             // in a row, that were where they usually are
+  int sweeps_to_go_ = 0;                                // consistent sweeps before the map grows again
+  std::optional<Time> refused_since_;                   // sweeps that fit nowhere
+  std::optional<Time> searched_since_;                  // sweeps that had to be found
 };
 
 }  // namespace kilvo
