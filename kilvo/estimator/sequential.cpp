@@ -8,15 +8,11 @@
 namespace kilvo {
 namespace {
 
-std::vector<PointXYZI> in_world(const std::vector<PointXYZI>& points_I, const SE3& T_WI) {
-  std::vector<PointXYZI> out(points_I.size());
+std::vector<PointXYZI> in_world(std::vector<PointXYZI> points_I, const SE3& T_WI) {
   const Eigen::Matrix3f R = T_WI.R.matrix().cast<float>();
   const Eigen::Vector3f p = T_WI.p.cast<float>();
-  for (std::size_t i = 0; i < points_I.size(); ++i) {
-    out[i].head<3>() = R * points_I[i].head<3>() + p;
-    out[i][3] = points_I[i][3];
-  }
-  return out;
+  for (PointXYZI& x : points_I) x.head<3>() = (R * x.head<3>() + p).eval();
+  return points_I;
 }
 
 // Of the part that a sweep did not know: a direction of the position in it.
@@ -51,9 +47,9 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   history_.record_from(prior, end);
   if (!lidar_.has_shape(end, prior)) return findings_.drop(Sensor::lidar, Reason::before_motion);
   Statistics& statistics = findings_.statistics();
-  const bool first = map_.surfaces().empty();
-  const bool alone = !status_.has_legs() && !has_camera(status_.modality());
-  const Registration sweep = map_.register_sweep(lidar_, scan, end, alone, history_, prior, statistics.points);
+  const bool first = map_.surfaces().empty(), alone = !status_.has_legs() && !has_camera(status_.modality());
+  const Registration sweep =
+      map_.register_sweep(lidar_, scan, end, alone, history_, prior, legs_.description_error(prior.x), statistics.points);
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
   if (sweep.refused) {

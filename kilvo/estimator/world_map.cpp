@@ -11,7 +11,8 @@ void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservab
   const SE3 T_WI = sweep.posterior.x.pose();
   if (sweep.carries && (is_given_ || may_grow)) error_.registered(T_WI, sweep.by_epoch, sweep.systematic, unobservable);
   if (is_given_ || !may_grow) return;
-  const std::uint32_t epoch = error_.epoch_now(T_WI, sweep.posterior.P.topLeftCorner<6, 6>());
+  const PoseCovariance P = sweep.posterior.P.topLeftCorner<6, 6>() + unobservable * sweep.considered * unobservable.transpose();
+  const std::uint32_t epoch = error_.epoch_now(T_WI, P);
   lidar_.range_noise = sweep.range_noise;
   // A few at a time: what is made of them is used while it is in the cache.
   constexpr std::size_t at_once = 32;
@@ -28,10 +29,10 @@ void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservab
 // Where the prior is uncertain for what the accelerometer reported alone, the sweep fits where nothing has pushed the robot; where it fits,
 // a push was not what was reported, and the velocity that it gave is not known.
 Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool alone, History& history, Estimate& prior,
-                                      PointDrops& drops) const {
+                                      const PoseCovariance& considered, PointDrops& drops) const {
   const PoseCovariance error = error_at(prior.x.pose());
   const ProcessNoise noise = history.replay().noise_within(prior.t - (end - prior.t), end);
-  Registration sweep = lidar.measure(scan, {end, prior, history.trajectory(), noise, error, alone}, surfaces_, drops);
+  Registration sweep = lidar.measure(scan, {end, prior, history.trajectory(), noise, error, alone, considered}, surfaces_, drops);
   const bool is_surprised = lidar.is_surprised(prior, sweep, error);
   if ((sweep.refused != Reason::fits_nowhere && !is_surprised) || (sweep.refused && !sweep.searched)) return sweep;
   auto doubted = history.doubted(prior.t, end, sweep.refused ? std::nullopt : std::optional((sweep.posterior.x.p - prior.x.p).norm()));
@@ -40,7 +41,8 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& sca
   doubted->record_from(expected, end);
   PointDrops counted;
   const PoseCovariance error_there = error_at(expected.x.pose());
-  Registration again = lidar.measure(scan, {end, expected, doubted->trajectory(), noise, error_there, alone}, surfaces_, counted);
+  Registration again =
+      lidar.measure(scan, {end, expected, doubted->trajectory(), noise, error_there, alone, considered}, surfaces_, counted);
   if (again.refused || !again.carries || (!sweep.refused && !LidarPipeline::agrees(expected, again, error_there))) return sweep;
   history = std::move(*doubted);
   prior = expected;

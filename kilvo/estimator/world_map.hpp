@@ -27,7 +27,7 @@ class WorldMap {
   /// Registers a sweep until `end` from `prior`, of its middle. Where it is not for what the accelerometer reported, that is doubted: then
   /// `history` and `prior` become what they are without. `alone`: see LidarPipeline::Context. `drops`: counts the points that are not used.
   Registration register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool alone, History& history, Estimate& prior,
-                              PointDrops& drops) const;
+                              const PoseCovariance& considered, PointDrops& drops) const;
   /// A sweep fitted nowhere. True when that has lasted: the robot is taken to be outside of the map, and it restarts around `prior`,
   /// unless it was given.
   bool refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time end);

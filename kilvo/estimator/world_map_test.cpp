@@ -85,5 +85,23 @@ TEST(WorldMap, WhatIsRegisteredToANewMapStaysAsUncertainAsThat) {
   EXPECT_GT(std::sqrt(map.error_at(first.posterior.x.pose())(3, 3)), 6.9) << "lost twice";
 }
 
+// Along a corridor the legs' description makes an error that the filter's covariance lacks: planes that were seen there have it.
+TEST(WorldMap, PlanesCarryWhatTheDescriptionMayBeOffByWhereNoSweepMeasures) {
+  WorldMap map = empty_world();
+  PoseCovariance along = none();
+  along(3, 3) = 1;
+  Registration sweep = floor_sweep();
+  sweep.considered.diagonal().tail<3>().setConstant(0.1 * 0.1);
+  map.learn(sweep, along, true);
+  map.surfaces().visit_planes({1, 1, 0}, [&sweep](const VoxelMap::Match& m) {
+    sweep.by_epoch = {{m.epoch, 1e6 * PoseCovariance::Identity()}};
+    return true;
+  });
+  map.learn(sweep, none(), true);
+  const PoseCovariance error = map.error_at(sweep.posterior.x.pose());
+  EXPECT_NEAR(std::sqrt(error(3, 3)), 0.1, 0.005);
+  EXPECT_LT(std::sqrt(error(4, 4)), 0.01) << "was measured";
+}
+
 }  // namespace world_map_test
 }  // namespace kilvo

@@ -41,7 +41,7 @@ PoseCovariance noise_of_velocity(const Covariance& P, double rate) {
 
 // How far the sweep moved the pose, per covariance of the prior.
 double squared_change(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
-  PoseCovariance P = prior.P.topLeftCorner<6, 6>() + map_error;
+  PoseCovariance P = prior.P.topLeftCorner<6, 6>() + map_error + sweep.considered;
   P.diagonal().array() += 1e-6;
   const Eigen::Matrix<double, 6, 1> change = boxminus(sweep.posterior.x, prior.x).head<6>();
   return change.dot(P.ldlt().solve(change));
@@ -67,6 +67,7 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
   const Estimate& prior = context.prior;
   Registration out;
   out.posterior = prior;
+  out.considered = context.considered;
   out.points = undistort(scan, context.trajectory, prior.t, mount_, drops);
   if (out.points.empty()) {
     out.refused = Reason::no_usable_point;
@@ -80,7 +81,7 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
   // With hysteresis: each change of mind would hand what was drifted since to the map.
   constexpr double to_leave = 3.0;
   if (is_blind_somewhere()) config.weak_share *= to_leave;
-  LidarModel model(map, out.clusters, mount_.T_imu_lidar.p, context.map_error, config, workers_, &blind_);
+  LidarModel model(map, out.clusters, mount_.T_imu_lidar.p, context.map_error + out.considered, config, workers_, &blind_);
   if (context.alone) model.keep_weak();
   if (map.empty()) {
     out.carries = true;

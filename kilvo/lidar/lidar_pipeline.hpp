@@ -27,14 +27,14 @@ struct Registration {
   std::optional<Reason> refused;  // the state is not changed
   bool searched = false;          // the prior was too uncertain for the nearest planes to be the right ones
   Estimate posterior;             // of the prior's time
-  /// It holds at least three directions and so carries the estimate. If not, the posterior is the prior.
-  bool carries = false;
+  bool carries = false;           // it holds three directions at least, and so the estimate; if not, the posterior is the prior
   RegistrationReport report;
   std::vector<PointXYZI> points;  // undistorted to the prior's time, in the IMU frame
   std::vector<PointCluster> clusters;
   double range_noise = 0;                              // m, of one range, as the sweeps so far show it
   std::vector<EpochInformation> by_epoch;              // see LidarModel
   PoseCovariance systematic = PoseCovariance::Zero();  // see LidarModel
+  PoseCovariance considered = PoseCovariance::Zero();  // of the pose, beyond the prior's: of a description that is not exact
 };
 
 class LidarPipeline {
@@ -57,12 +57,13 @@ class LidarPipeline {
 
   /// What the estimator knows when a sweep comes.
   struct Context {
-    Time end;                         // of the sweep
-    const Estimate& prior;            // at its middle
-    const Trajectory& trajectory;     // covers it
-    const ProcessNoise& noise;        // of the IMU within it
-    const PoseCovariance& map_error;  // of the map around the prior
-    bool alone = false;               // neither legs nor images measure what a sweep does not hold
+    Time end;                                            // of the sweep
+    const Estimate& prior;                               // at its middle
+    const Trajectory& trajectory;                        // covers it
+    const ProcessNoise& noise;                           // of the IMU within it
+    const PoseCovariance& map_error;                     // of the map around the prior
+    bool alone = false;                                  // neither legs nor images measure what a sweep does not hold
+    PoseCovariance considered = PoseCovariance::Zero();  // see Registration
   };
   /// An empty map takes the sweep as it is. `drops`: counts the points that are not used.
   Registration measure(const LidarScan& scan, const Context& context, const VoxelMap& map, PointDrops& drops);
