@@ -39,11 +39,11 @@ PointToPlaneRow point_to_plane(const SE3& T_WI, const Eigen::Vector3d& p_I, cons
 }
 
 LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL,
-                       const PoseCovariance& map_error, const LidarConfig& config, const Workers& workers, const BlindDirections* blind)
+                       const PoseCovariance& common_error, const LidarConfig& config, const Workers& workers, const BlindDirections* blind)
     : map_(map),
       clusters_(clusters),
       p_IL_(p_IL),
-      map_error_(map_error),
+      common_error_(common_error),
       config_(config),
       workers_(workers),
       places_(clusters.size()),
@@ -206,7 +206,7 @@ void LidarModel::add_row(std::size_t i, const SE3& T_WI, Sums& sums) {
 
 Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   const SE3 T_WI = x.pose();
-  const Iterate at{T_WI, prior.topLeftCorner<6, 6>() + map_error_};
+  const Iterate at{T_WI, prior.topLeftCorner<6, 6>() + common_error_};
   report_.clusters = static_cast<int>(clusters_.size());
   report_.rejected = workers_.sum(clusters_.size(), at_once, 0, [&](std::size_t first, std::size_t last) {
     int rejected = 0;

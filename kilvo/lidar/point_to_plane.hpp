@@ -34,9 +34,9 @@ struct RegistrationReport {
 /// The model that `update` calls: at each iterate it looks the planes up anew, gates, and sums the rows.
 class LidarModel {
  public:
-  /// Keeps references: the map, the clusters and the workers must outlive it. `map_error`: covariance of the pose from the map's own error,
-  /// by which the gate is wider than the filter's covariance says.
-  LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const PoseCovariance& map_error,
+  /// Keeps references: the map, the clusters and the workers must outlive it. `common_error`: covariance of the pose that the filter's own
+  /// lacks, from errors of the map and of the description; the gate is wider by it.
+  LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const PoseCovariance& common_error,
              const LidarConfig& config, const Workers& workers, const BlindDirections* blind = nullptr);
 
   /// Nothing else measures what the sweep hardly holds: what of it is not faked is kept.
@@ -85,7 +85,7 @@ class LidarModel {
   const VoxelMap& map_;
   std::span<const PointCluster> clusters_;
   Eigen::Vector3d p_IL_;
-  PoseCovariance map_error_;
+  PoseCovariance common_error_;
   LidarConfig config_;
   const Workers& workers_;
   std::vector<Place> places_;
