@@ -57,6 +57,8 @@ class ContactFilter {
   void add_force_side(double side, Likelihood& log) const;
   void add_impacts(const ContactCues& cues, Likelihood& log);
   void transit(double dt);
+  double rate_of_leaving(State state) const;
+  void time_support(double dt);
   void learn(const ContactCues& cues);
   double worth_of_impact() const;
 
@@ -65,6 +67,10 @@ class ContactFilter {
   RunningStatistics lifted_, level_;                // height of a swinging foot over the other; of two that stand
   RunningStatistics on_left_, on_right_, on_both_;  // where the line of force meets the ground
   double since_support_ = 1e9;                      // s since one foot carried alone
+  RunningStatistics double_, single_;               // ln of the time that both feet carry, that one does, s
+  State support_ = both, last_single_ = none;       // the last state that was sure, the last foot that carried alone
+  double in_support_ = 0, single_time_ = 0;         // s in that state; in the single support before it
+  double others_ = 0, same_ = 0;                    // how often the other foot lifted off next, or the same one again
   // How well impacts indicate touchdowns on this robot.
   struct Landing {
     bool stood = true, seen = false;  // seen: an impact has counted in this swing
