@@ -2,25 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 namespace kilvo {
 namespace {
 
 constexpr double prior_time = 1.0, memory = 3.0;  // s of support, of learning
 // Samples closer together than this count as one, s.
 constexpr double correlation = 0.005;
-// Both feet belong to a walk for so long after one of them carried alone, s.
-constexpr double within_walk = 0.5;
 // Largest log-likelihood of one cue: it may be wrong for a reason that is not modelled.
 constexpr double most_of_speed = 6, most_of_others = 4;
 // A robot at rest is not slower than this, in ln.
 constexpr double slowest = 0.002;
 // An impact counts for so long, s; without any knowledge it comes by chance so often within a swing of a second.
 constexpr double impact_time = 0.05, chance = 0.02, most_of_impact = 6;
-// A state ends by chance at this rate, 1/s, besides when the gait ends it.
-constexpr double rate_of_change = 4;
-// Times of support: counts of the prior and of what is remembered.
-constexpr double prior_steps = 3, remembered_steps = 10;
 // Where the line of force meets the ground on either foot is this far apart at least, of the distance of the feet.
 constexpr double least_apart = 0.6;
 constexpr double weightless = 0.2, half_weight = 0.5;
@@ -48,18 +41,14 @@ ContactFilter::ContactFilter()
       level_(0, 0.015, prior_time, memory),
       on_left_(1, 0.4, prior_time, memory),
       on_right_(0, 0.4, prior_time, memory),
-      on_both_(0.5, 0.4, prior_time, memory),
-      double_(std::log(0.1), 0.7, prior_steps, remembered_steps),
-      single_(std::log(0.4), 0.7, prior_steps, remembered_steps) {
+      on_both_(0.5, 0.4, prior_time, memory) {
   restart();
 }
 
 void ContactFilter::restart() {
   pi_ = {0.7, 0.15, 0.15, 0};
   landing_ = {};
-  since_support_ = 1e9;
-  support_ = both;
-  last_single_ = none;
+  times_.restart();
 }
 
 double ContactFilter::stance_speed() const { return std::exp(speeds_of(stance_, swing_).stance); }
@@ -132,53 +121,18 @@ void ContactFilter::add_impacts(const ContactCues& cues, Likelihood& log) {
   }
 }
 
-// By chance, or because the gait has come so far: the hazard of a log-logistic distribution of the times that this robot's supports last.
-double ContactFilter::rate_of_leaving(State state) const {
-  if (state != support_ || state == none || since_support_ > within_walk) return rate_of_change;
-  const RunningStatistics& time = state == both ? double_ : single_;
-  const double shape = std::numbers::pi / std::numbers::sqrt3 / time.sigma();
-  const double passed = std::pow(in_support_ / std::exp(time.mean()), shape);
-  return rate_of_change + shape / std::max(correlation, in_support_) * passed / (1 + passed);
-}
-
 void ContactFilter::transit(double dt) {
-  const auto share = [&](State state) { return std::min(0.5, rate_of_leaving(state) * dt); };
-  const auto [b, l, r, n] = pi_;
-  const double from_b = b * share(both), from_l = l * share(left), from_r = r * share(right), from_n = n * share(none);
-  const double flight = 0.1 * std::min(0.5, rate_of_change * dt), other = (others_ + 1) / (others_ + same_ + 2);
-  const double to_left = last_single_ == none || since_support_ > within_walk ? 0.5 : last_single_ == right ? other : 1 - other;
-  pi_[both] = b * (1 - flight) - from_b + 0.9 * (from_l + from_r + from_n);
-  pi_[left] = l * (1 - flight) - from_l + to_left * from_b + 0.1 * from_r + 0.05 * from_n;
-  pi_[right] = r * (1 - flight) - from_r + (1 - to_left) * from_b + 0.1 * from_l + 0.05 * from_n;
-  pi_[none] = n - from_n + flight * (b + l + r);
-}
-
-// How long each support lasts, and which foot lifts off after it. A foot that was down for a moment only has not ended its swing.
-void ContactFilter::time_support(double dt) {
-  in_support_ += dt;
-  const State next = static_cast<State>(std::max_element(pi_.begin(), pi_.end()) - pi_.begin());
-  if (next == support_ || pi_[next] < sure_of_state) return;
-  const bool walks = last_single_ != none && since_support_ < within_walk, again = walks && next == last_single_;
-  if (next == both) {
-    single_time_ = in_support_;
-  } else if (next != none) {
-    if (walks) {
-      const double kept = 1 - 1 / remembered_steps;
-      others_ = kept * others_ + !again;
-      same_ = kept * same_ + again;
-    }
-    if (walks && !again) {
-      single_.add(std::log(std::max(correlation, support_ == both ? single_time_ : in_support_)), 1);
-      if (support_ == both) double_.add(std::log(std::max(correlation, in_support_)), 1);
-    }
-    last_single_ = next;
-  }
-  in_support_ = again ? in_support_ + single_time_ : 0;
-  support_ = next;
+  const auto leaving = [&](State state) { return pi_[state] * std::min(0.5, times_.rate_of_leaving(state, dt) * dt); };
+  const double b = leaving(both), l = leaving(left), r = leaving(right), n = leaving(none), next = times_.left_next();
+  const Likelihood flight = {0.1 * b, 0.1 * l, 0.1 * r, 0};
+  pi_[both] += 0.9 * (l + r + n) - b - flight[both];
+  pi_[left] += next * b + 0.1 * r + 0.05 * n - l - flight[left];
+  pi_[right] += (1 - next) * b + 0.1 * l + 0.05 * n - r - flight[right];
+  pi_[none] += flight[both] + flight[left] + flight[right] - n;
 }
 
 void ContactFilter::update(const ContactCues& cues) {
-  transit(cues.dt);
+  if (cues.dt > 0) transit(cues.dt);
   Likelihood log{};
   add_speed(cues, log);
   add_height(cues.height, log);
@@ -192,17 +146,15 @@ void ContactFilter::update(const ContactCues& cues) {
   constexpr double floor = 1e-9;
   for (std::size_t k = 0; k < states; ++k) sum += pi_[k] = std::max(floor, pi_[k] * std::exp(log[k] - most));
   for (double& p : pi_) p /= sum;
-  time_support(cues.dt);
+  times_.update(pi_, cues.dt);
   learn(cues);
 }
 
 // From a foot that carries alone: what a supporting foot does while the other swings (the paper's S_sw). Standing teaches nothing.
 void ContactFilter::learn(const ContactCues& cues) {
-  since_support_ += cues.dt;
   for (std::size_t side = 0; side < 2; ++side) {
     const double p = pi_[side == 0 ? left : right];
     if (p <= sure_of_state) continue;
-    since_support_ = 0;
     const double weight = p * cues.dt;
     (side == 0 ? on_left_ : on_right_).add(cues.force_side, weight);
     lifted_.add(side == 0 ? -cues.height : cues.height, weight);
@@ -210,7 +162,7 @@ void ContactFilter::learn(const ContactCues& cues) {
     stance_.add(std::log(cues.speed[side] + slowest), weight);
     swing_.add(std::log(cues.speed[1 - side] + slowest), weight);
   }
-  if (pi_[both] > sure_of_state && since_support_ < within_walk) {
+  if (pi_[both] > sure_of_state && times_.walks()) {
     level_.add(cues.height, pi_[both] * cues.dt);
     on_both_.add(cues.force_side, pi_[both] * cues.dt);
   }

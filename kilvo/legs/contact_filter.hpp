@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 #include "kilvo/math/running_statistics.hpp"
@@ -52,13 +53,34 @@ class ContactFilter {
 
  private:
   using Likelihood = std::array<double, states>;
+  /// How long the supports of this robot last, and which foot lifts off next.
+  class SupportTimes {
+   public:
+    void restart();
+    /// One foot carried alone a moment ago.
+    bool walks() const;
+    /// Rate at which this state ends within the next dt (s, above zero), 1/s: by chance, or because the gait has come so far.
+    double rate_of_leaving(State state, double dt) const;
+    /// That it is the left foot which carries alone after both.
+    double left_next() const;
+    /// After each sample.
+    void update(const std::array<double, states>& pi, double dt);
+
+   private:
+    void enter(State next);
+
+    RunningStatistics double_{std::log(0.1), 0.7, 3, 10}, single_{std::log(0.4), 0.7, 3, 10};  // ln of s; the weights are steps
+    State now_ = both, last_single_ = none;  // the last state that was sure, and the last foot that carried alone
+    double in_now_ = 0, in_single_ = 0;      // s since now_ began, s that the single support before it took
+    double since_single_ = 1e9;              // s
+    double other_ = 0, same_ = 0;            // how often the other foot lifted off next, or the same one again
+  };
+
   void add_speed(const ContactCues& cues, Likelihood& log) const;
   void add_height(double height, Likelihood& log) const;
   void add_force_side(double side, Likelihood& log) const;
   void add_impacts(const ContactCues& cues, Likelihood& log);
   void transit(double dt);
-  double rate_of_leaving(State state) const;
-  void time_support(double dt);
   void learn(const ContactCues& cues);
   double worth_of_impact() const;
 
@@ -66,11 +88,7 @@ class ContactFilter {
   RunningStatistics stance_, swing_;                // ln of the speed
   RunningStatistics lifted_, level_;                // height of a swinging foot over the other; of two that stand
   RunningStatistics on_left_, on_right_, on_both_;  // where the line of force meets the ground
-  double since_support_ = 1e9;                      // s since one foot carried alone
-  RunningStatistics double_, single_;               // ln of the time that both feet carry, that one does, s
-  State support_ = both, last_single_ = none;       // the last state that was sure, the last foot that carried alone
-  double in_support_ = 0, single_time_ = 0;         // s in that state; in the single support before it
-  double others_ = 0, same_ = 0;                    // how often the other foot lifted off next, or the same one again
+  SupportTimes times_;
   // How well impacts indicate touchdowns on this robot.
   struct Landing {
     bool stood = true, seen = false;  // seen: an impact has counted in this swing

@@ -58,6 +58,41 @@ TEST(ContactFilter, FollowsWalksAtAnyRateWithoutACliff) {
   }
 }
 
+// Share of wrong flags from the fifth second after `blips` on; the noise of the cues lasts for 20 ms. Each cycle lasts 1 s, longer or
+// shorter by at most `irregular`; before `blips` each swing has a moment in which the foot seems to stand.
+double errors_of_gait(double irregular, double blips = 0) {
+  const Walk walk;
+  test::Random random(7);
+  ContactFilter filter;
+  double wrong = 0, all = 0, phase = -1, pace = 1;
+  std::uint64_t noise = 0;
+  for (double s = -1; s < 60; s += 0.002) {
+    if (std::fmod(s + 1, 0.02) < 0.002) ++noise;
+    const double cycles = std::floor(phase);
+    phase += 0.002 * pace;
+    if (std::floor(phase) > cycles) pace = 1 / random.uniform(1 - irregular, 1 + irregular);
+    test::Random held(noise);
+    const double within = std::fmod(phase + 1, 0.5 * Walk::cycle);
+    const bool blip = s < blips && within > 0.18 && within < 0.22;
+    filter.update(walk.cues(held, blip ? -1 : phase, 0.002));
+    for (std::size_t side = 0; side < 2 && s > blips + 5; ++side) {
+      wrong += (filter.carries(side) > 0.5) == Walk::stands(side, phase) ? 0 : 1;
+      ++all;
+    }
+  }
+  return wrong / all;
+}
+
+// The cues are as good in both.
+TEST(ContactFilter, AGaitThatKeepsItsTimesIsFollowedBetterThanOneThatDoesNot) {
+  const double regular = errors_of_gait(0), irregular = errors_of_gait(0.7);
+  EXPECT_LT(regular, 0.5 * irregular);
+  EXPECT_LT(regular, 0.001);
+  EXPECT_LT(irregular, 0.003);
+}
+
+TEST(ContactFilter, FeetThatAreDownForAMomentDoNotShortenTheirSwings) { EXPECT_LT(errors_of_gait(0, 30), errors_of_gait(0) + 0.0005); }
+
 TEST(ContactFilter, LearnsRobotsWhoseSolesNeverSeemToStandStill) {
   for (const double stance : {0.002, 0.01, 0.04}) {
     Walk walk;

@@ -114,10 +114,18 @@ std::array<bool, 2> StanceTracker::carriers(const Contacts& contacts, double dt)
     out[left_carries ? 0 : 1] = true;
     return out;
   }
-  if (!out[0] || !out[1]) return out;
-  // A foot that has just come down settles first, while the other carries.
-  const std::size_t newer = contacts.phase(0) < contacts.phase(1) ? 0 : 1;
-  if (contacts.phase(newer) + dt < config_.entry_delay && contacts.phase(1 - newer) > contacts.phase(newer)) out[newer] = false;
+  const std::array<bool, 2> in = {feet_[0].weights.has_value(), feet_[1].weights.has_value()};
+  for (std::size_t side = 0; side < 2; ++side) {
+    const double phase = contacts.phase(side) + dt;
+    const std::size_t other = 1 - side;
+    if (!contacts.on[side] || in[side]) continue;
+    // The impact of a foot that comes down moves what is measured of the other one, too.
+    if (in[other] && phase < config_.entry_delay + entry_time && contacts.probability[other] > 1 - ContactFilter::sure_of_state)
+      out[other] = true;
+    // It settles first, while the other carries.
+    const bool can_wait = in[other] || contacts.phase(other) > contacts.phase(side);
+    if (out[other] && can_wait && phase < config_.entry_delay) out[side] = false;
+  }
   return out;
 }
 
@@ -163,8 +171,8 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
   LegStep out;
   out.t = feet.t;
   out.dt = last_ ? std::clamp(to_seconds(feet.t - *last_), shortest_step, longest_step) : longest_step;
+  const std::array<bool, 2> carries = carriers(contacts, last_ ? out.dt : 0);
   last_ = feet.t;
-  const std::array<bool, 2> carries = carriers(contacts, out.dt);
   out.velocity_sigma = noise_.horizontal();
   out.vertical_velocity_sigma = noise_.vertical();
   out.gyro_bias = standing_rate_.add(feet, contacts, omega + x.bg);
@@ -175,7 +183,8 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     foot.ends = std::exchange(state.leaves, false);
     foot.R_IF = pose.R_IF;
     // It came down at some time since the sample before the one that shows it.
-    const double phase = contacts.phase(side) + out.dt;
+    if (!state.weights) state.touchdown = contacts.since[side];
+    const double phase = to_seconds(feet.t - state.touchdown) + out.dt;
     const double rolling = std::max(rolling_speed, rolling_share * contacts.sole_speed);
     const auto weights = share_of_corners(pose, x, omega, rolling);
     if (stuck(side, feet, omega) || !carries[side]) {

@@ -49,6 +49,7 @@ class StanceTracker {
   bool stuck(std::size_t side, const Feet& feet, const Eigen::Vector3d& omega);
   struct Foot {
     std::optional<Weights> weights;                           // of the corners, in stance
+    Time touchdown{};                                         // of this stance
     bool leaves = false;                                      // the filter at the next step
     std::optional<Time> refused_since;                        // its rows are beyond the gate
     Eigen::Vector3d sole_velocity = Eigen::Vector3d::Zero();  // in stance, averaged, in the world, m/s

@@ -94,6 +94,39 @@ TEST(StanceTracker, WhenNoFootIsBelievedTheMoreProbableCarriesUnlessTheBodyFalls
   EXPECT_FALSE(flying.foot[0].used || flying.foot[1].used);
 }
 
+// A touchdown jolts the robot: for a sample or two the foot that carries seems to leave. Were it to enter anew, its place would be lost.
+TEST(StanceTracker, AFootInContactKeepsItsPlaceThroughTheImpactOfTheOther) {
+  const auto after_impact = [](double probability) {
+    StanceTracker tracker{LegConfig{}};
+    const State body = test::body_at({0, 0, 0.75}, Eigen::Vector3d::Zero());
+    Feet feet;
+    feet.foot = {test::seen_from(body, standing(0)), test::seen_from(body, standing(1))};
+    Contacts contacts;
+    contacts.since = {test::gait_begin - std::chrono::seconds(1), test::gait_begin};
+    std::array<LegStep, 2> out;
+    for (int i = 0; i < 40; ++i) {
+      feet.t = contacts.t = test::gait_begin + std::chrono::milliseconds(10 * i);
+      const bool left_jolts = i == 30, right_is_down = i >= 30;
+      contacts.on = {!left_jolts, right_is_down};
+      contacts.probability = {left_jolts ? probability : 0.99, right_is_down ? 0.99 : 0.01};
+      if (i == 30) contacts.since = {feet.t, feet.t};
+      if (i == 31) contacts.since[0] = feet.t;
+      const LegStep step = tracker.step(feet, contacts, body, Eigen::Vector3d::Zero());
+      if (i == 30 || i == 31) out[static_cast<std::size_t>(i - 30)] = step;
+    }
+    return out;
+  };
+  const auto kept = after_impact(0.45);
+  EXPECT_TRUE(kept[0].foot[0].used);
+  EXPECT_FALSE(kept[0].foot[1].used);
+  EXPECT_FALSE(kept[1].foot[0].begins);
+  EXPECT_LT(kept[1].foot[0].variance_scale, 3) << "it does not settle again";
+  const auto left = after_impact(0.05);
+  EXPECT_FALSE(left[0].foot[0].used);
+  EXPECT_TRUE(left[0].foot[1].used);
+  EXPECT_FALSE(left[1].foot[0].used);
+}
+
 TEST(StanceTracker, AFootThatStillSlidesAsItEntersTakesItsContactPositionAlongAndALaterOneDoesNot) {
   constexpr double sliding = 0.2, period = 1e-3;  // m/s, s
   const LegConfig config;
