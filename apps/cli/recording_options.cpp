@@ -6,6 +6,7 @@ lab::RecordingOptions recording_options(const lab::Settings& settings, const std
   const auto rates = rates_of(settings.robot), offsets = time_offsets_of(settings.robot);
   lab::RecordingOptions out;
   for (const Sensor sensor : used) out[sensor] = {true, settings.topic(sensor), rates[index_of(sensor)], offsets[index_of(sensor)]};
+  out[Sensor::imu].gyro_scale = settings.robot.imu.gyro_scale;
   if (out[Sensor::legs].use && settings.leg_clock.clock != "stamp") out.leg_clock.emplace(settings.leg_clock, settings.robot);
   return out;
 }

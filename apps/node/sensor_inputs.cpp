@@ -26,7 +26,7 @@ SensorInputs::SensorInputs(const lab::Settings& settings, bool no_deskew, Sink s
   if (no_deskew) point_time_.emplace();
   for (const Sensor sensor : all_sensors) {
     input_of(sensor).topic = settings.topic(sensor);
-    input_of(sensor).intake = lab::SensorIntake(time_offsets_of(settings.robot)[index_of(sensor)]);
+    input_of(sensor).intake = lab::SensorIntake(time_offsets_of(settings.robot)[index_of(sensor)], settings.robot.imu.gyro_scale);
   }
 }
 

@@ -24,14 +24,16 @@ struct ImuMount {
   double time_offset = 0;  // s, added to the stamps
   double accel_range = 0;  // m/s^2, 0: found from the data
   double gyro_range = 0;   // rad/s, 0: found from the data
-  std::string link;        // URDF link that T_link_imu refers to
+  Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();
+  std::string link;  // URDF link that T_link_imu refers to
   SE3 T_link_imu;
 
   static constexpr auto fields() {
     return std::tuple{Field{"rate", &ImuMount::rate, "Hz", "nominal rate of the IMU"},
                       Field{"time_offset", &ImuMount::time_offset, "s", "added to the stamps of the IMU"},
                       Field{"accel_range", &ImuMount::accel_range, "m/s^2", "end of the accelerometer's range; 0: found from the data"},
-                      Field{"gyro_range", &ImuMount::gyro_range, "rad/s", "end of the gyroscope's range; 0: found from the data"}};
+                      Field{"gyro_range", &ImuMount::gyro_range, "rad/s", "end of the gyroscope's range; 0: found from the data"},
+                      Field{"gyro_scale", &ImuMount::gyro_scale, "-", "what the rate about each axis of the gyroscope is multiplied by"}};
   }
 };
 

@@ -80,6 +80,7 @@ class Examination {
   void accuse_gyro_in_degrees(const std::string& evidence);
   void settle_axes();
   void examine_gyro_scale(const std::vector<Turn>& turns, const MountFit& fit);
+  void refine_gyro_scale(const MountFit& fit);
   void accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence);
   /// `only_calm`: none when what the accelerometer measures does not average to gravity.
   std::optional<double> tilt_under(const SO3& R_link_imu, bool only_calm) const;

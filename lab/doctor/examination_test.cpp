@@ -1,6 +1,7 @@
 // Wrong descriptions of a simulated robot: the culprit is named, and nobody else is.
 #include "lab/doctor/examination.hpp"
 
+#include <fmt/core.h>
 #include <functional>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -144,6 +145,29 @@ TEST(Doctor, AGyroThatIsATenthTooFastIsNamed) {
     for (InertialSample& s : recorded.imu) s.gyro *= factor;
     EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("gyro_unit")) << factor;
   }
+}
+
+TEST(Doctor, TheScaleOfAnAxisOfTheGyroIsMeasured) {
+  const auto scale_of_gyro = [](double about_z) {
+    Recorded recorded = walked().recorded;
+    for (InertialSample& s : recorded.imu) s.gyro.z() *= about_z;
+    Robot robot = walked().robot;
+    robot.imu.gyro_scale = {1, 1, 0.5};  // with which it was recorded
+    Examination examination(recorded, robot);
+    EXPECT_TRUE(examination.run().good());
+    for (const Refinement& r : examination.refinements())
+      if (r.what == "scale of the gyro's axes") return r;
+    return Refinement{};
+  };
+  const Refinement wrong = scale_of_gyro(1.02);
+  ASSERT_EQ(wrong.change.size(), 3U);
+  EXPECT_NEAR(wrong.change[2], 1 / 1.02 - 1, 3 * wrong.sigma[2]);
+  EXPECT_NEAR(wrong.taken[2], wrong.change[2], 0.004);
+  EXPECT_LT(wrong.sigma[2], 0.002);
+  ASSERT_EQ(wrong.changes.size(), 1U);
+  EXPECT_EQ(wrong.changes[0].key, "imu.gyro_scale");
+  EXPECT_NE(wrong.changes[0].value.find(fmt::format(", {:.5f}]", 0.5 * (1 + wrong.taken[2]))), std::string::npos) << wrong.changes[0].value;
+  EXPECT_FALSE(scale_of_gyro(1).is_taken());
 }
 
 TEST(Doctor, AGyroInDegreesIsNamedByTheLidarAlone) {

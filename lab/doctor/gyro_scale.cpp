@@ -92,4 +92,14 @@ void Examination::examine_gyro_scale(const std::vector<Turn>& turns, const Mount
         true});
 }
 
+// Without it a robot on its legs and IMU alone turns by what the gyro is off.
+void Examination::refine_gyro_scale(const MountFit& fit) {
+  constexpr double method = 1e-3, largest = 3e-3;  // rates of a sensor that clips and vibrates are off by as much
+  const Eigen::Vector3d x = -fit.gyro_excess, s = fit.gyro_excess_sigma;
+  Refinement r = refinement(Sensor::imu, "scale of the gyro's axes", {x.x(), x.y(), x.z()}, {s.x(), s.y(), s.z()}, method, largest, "-");
+  const Eigen::Vector3d scale = original_.imu.gyro_scale.cwiseProduct(Eigen::Vector3d::Ones() + r.taken_vector());
+  r.changes = {{"imu.gyro_scale", fmt::format("[{:.5f}, {:.5f}, {:.5f}]", scale.x(), scale.y(), scale.z())}};
+  refinements_.push_back(std::move(r));
+}
+
 }  // namespace kilvo::lab

@@ -81,6 +81,7 @@ MountFit Examination::examine_lidar_rotation() {
   lidar_.error = (fit.R * described.inverse()).matrix();
   lidar_offset_ = fit.offset;
   examine_gyro_scale(turns, fit);
+  refine_gyro_scale(fit);
   constexpr double method = 0.1;  // degrees: the gyro's own misalignment is taken for the mount's
   refine_rotation(Sensor::lidar, "rotation of the LiDAR on the IMU", described, fit.R, fit.rotation_sigma(), method, "lidar.T_imu_lidar.R");
   const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();

@@ -199,6 +199,7 @@ class MountResiduals {
   }
 
   static constexpr Eigen::Index plain = 7, all = 22;
+  static constexpr int of_axis[] = {16, 19, 21};  // the gyro's excess about x, y, z
 
  private:
   // Once for all parameters but the offset.
@@ -261,7 +262,14 @@ MountFit refine_mount(const std::vector<Turn>& turns, const GyroPath& gyro, cons
   }
   residuals.predict(share);
   const Fit fit = robust_fit(std::ref(residuals), x, prior, Eigen::VectorXd::Constant(n, 1e-3));
-  return fit.good ? mount_of(fit, turns, gyro, start.R, start.offset) : start;
+  if (!fit.good) return start;
+  MountFit out = mount_of(fit, turns, gyro, start.R, start.offset);
+  for (int axis = 0; axis < 3; ++axis) {
+    const int place = MountResiduals::of_axis[axis];
+    out.gyro_excess[axis] = fit.x[place];
+    out.gyro_excess_sigma[axis] = fit.sigma(place);
+  }
+  return out;
 }
 
 std::vector<Turn> best_half(const std::vector<Turn>& turns, const GyroPath& gyro, const MountFit& fit) {

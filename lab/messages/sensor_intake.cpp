@@ -25,6 +25,7 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
   gyro_ = decoded->gyro;
   counts_.absurd_point_times += decoded->absurd_times;
   if (const auto* joints = std::get_if<JointSample>(&decoded->measurement)) joint_names_ = joints->names;
+  if (auto* imu = std::get_if<ImuSample>(&decoded->measurement)) imu->gyro = imu->gyro.cwiseProduct(gyro_scale_);
   Time& stamp = stamp_in(decoded->measurement);
   if (stamp == Time{}) {
     // A driver that does not stamp, as some do not their joints: the time of arrival is the best there is.

@@ -23,8 +23,10 @@ struct SensorCounts {
 
 class SensorIntake {
  public:
-  /// `time_offset`: s, added to the stamps (of a scan: to the time that its points count from). `with_colours`: images are to give them.
-  explicit SensorIntake(double time_offset = 0, bool with_colours = true) : time_offset_(time_offset), with_colours_(with_colours) {}
+  /// `time_offset`: s, added to the stamps (of a scan: to the time that its points count from). `gyro_scale`: of each axis of an IMU.
+  /// `with_colours`: images are to give them.
+  explicit SensorIntake(double time_offset = 0, const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones(), bool with_colours = true)
+      : time_offset_(time_offset), gyro_scale_(gyro_scale), with_colours_(with_colours) {}
 
   /// `arrived`: when the message was recorded, or received. `point_time` matters for LiDAR types only.
   /// `type` is a plain_type_name() that is_type_of() the sensor.
@@ -51,6 +53,7 @@ class SensorIntake {
 
  private:
   double time_offset_;
+  Eigen::Vector3d gyro_scale_;
   bool with_colours_;
   JointNames joint_names_;  // of the message that was taken last
   SensorCounts counts_;

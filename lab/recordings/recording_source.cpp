@@ -37,7 +37,7 @@ RecordingSource::RecordingSource(const std::vector<std::filesystem::path>& input
     : reader_(open_recordings(inputs)), options_(std::move(options)) {
   for (const Sensor sensor : all_sensors) {
     if (!options_[sensor].use) continue;
-    intakes_[index_of(sensor)] = SensorIntake(options_[sensor].time_offset, options_.with_colours);
+    intakes_[index_of(sensor)] = SensorIntake(options_[sensor].time_offset, options_[sensor].gyro_scale, options_.with_colours);
     try {
       chosen_[index_of(sensor)] = choose_topic(reader_->connections(), sensor, options_[sensor].topic);
     } catch (const InputError& error) {

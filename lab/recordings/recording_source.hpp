@@ -24,6 +24,7 @@ struct SensorInput {
   std::string topic;       // `/camera/image_raw` means its `/compressed` too
   double rate = 0;         // Hz, nominal; 0: unknown. Of the LiDAR it helps to tell the unit of the point times
   double time_offset = 0;  // s, added to the stamps (of a scan: to the time that its points count from)
+  Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();  // of each axis of an IMU
 };
 
 struct RecordingOptions {

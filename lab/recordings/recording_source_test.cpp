@@ -104,6 +104,26 @@ TEST(RecordingSource, TimeOffsetsMoveTheStamps) {
   EXPECT_FALSE(first_imu || first_scan);
 }
 
+TEST(RecordingSource, TheGyrosScaleMultipliesItsRates) {
+  const TemporaryFolder folder;
+  write_bag(folder / "walk.bag", tiny_walk());
+  auto options = use({Sensor::imu});
+  RecordingSource as_written(folder / "walk.bag", options);
+  options[Sensor::imu].gyro_scale = {2, 1, 0.5};
+  RecordingSource scaled(folder / "walk.bag", options);
+  const auto before = drain(as_written), after = drain(scaled);
+  ASSERT_EQ(before.size(), after.size());
+  ASSERT_FALSE(before.empty());
+  double turning = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const auto &raw = std::get<ImuSample>(before[i]), &used = std::get<ImuSample>(after[i]);
+    EXPECT_EQ(used.gyro, raw.gyro.cwiseProduct(Eigen::Vector3d(2, 1, 0.5)));
+    EXPECT_EQ(used.accel, raw.accel);
+    turning += raw.gyro.norm();
+  }
+  EXPECT_GT(turning, 0);
+}
+
 TEST(RecordingSource, AWantedSensorWithoutATopicIsAnErrorThatNamesTheFileAndTheNearest) {
   const TemporaryFolder folder;
   write_bag(folder / "walk.bag", tiny_walk());

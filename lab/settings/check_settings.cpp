@@ -30,6 +30,9 @@ void check_value(const Settings& s, const Setting& setting) {
   };
   if (const auto* number = std::get_if<double*>(&setting.value)) check_number(**number);
   if (const auto* number = std::get_if<int*>(&setting.value)) check_number(**number);
+  if (const auto* vector = std::get_if<Eigen::Vector3d*>(&setting.value)) {
+    for (const double number : **vector) check_number(number);
+  }
   const std::vector<std::string>& choices = choices_of(setting.key);
   const auto* text = std::get_if<std::string*>(&setting.value);
   if (text != nullptr && !choices.empty() && std::ranges::find(choices, **text) == choices.end()) {

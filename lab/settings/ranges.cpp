@@ -22,6 +22,7 @@ constexpr std::pair<std::string_view, Range> ranges[] = {
     {"imu.time_offset", {-10, 10}},
     {"imu.accel_range", up_to(10000)},
     {"imu.gyro_range", up_to(1000)},
+    {"imu.gyro_scale", {0.5, 2}},
     {"imu.gyro_noise", above_zero(1000)},
     {"imu.accel_noise", above_zero(10000)},
     {"imu.velocity_noise", up_to(1000)},

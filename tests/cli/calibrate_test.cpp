@@ -83,6 +83,13 @@ TEST_F(Calibrate, IsDoneByARunItself) {
   EXPECT_LT(error_of({off, wrong_by(0.5), "lidar.time_offset=0.006", "calibration.online=true"}, found), 0.3 * wrong);
 }
 
+TEST_F(Calibrate, MeasuresTheScaleOfTheGyro) {
+  const Finished f = calibrate({"imu.gyro_scale=[1, 1, 0.985]"});
+  ASSERT_EQ(f.code, 0) << f.err;
+  EXPECT_THAT(f.out, HasSubstr("scale of the gyro's axes"));
+  EXPECT_NEAR(lab::load_settings(better_, {}).robot.imu.gyro_scale.z(), 1, 0.004);
+}
+
 TEST_F(Calibrate, ChangesNothingThatIsRight) {
   const Finished f = calibrate({});
   ASSERT_EQ(f.code, 0) << f.err;
