@@ -46,20 +46,15 @@ void ContactFilter::SupportTimes::update(const std::array<double, states>& pi, d
 
 // A foot that was down for a moment only has not ended its swing.
 void ContactFilter::SupportTimes::enter(State next) {
-  const bool known = last_single_ != none && walks(), again = known && next == last_single_;
-  if (next == both) {
-    in_single_ = in_now_;
-  } else if (next != none) {
-    if (known) {
-      other_ = 0.9 * other_ + !again;
-      same_ = 0.9 * same_ + again;
-    }
-    if (known && !again) {
-      single_.add(std::log(now_ == both ? in_single_ : in_now_), 1);
-      if (now_ == both) double_.add(std::log(in_now_), 1);
-    }
-    last_single_ = next;
+  const bool known = last_single_ != none && walks(), again = known && next == last_single_, is_single = next == left || next == right;
+  if (now_ == left || now_ == right) in_single_ = in_now_;
+  if (is_single && known) {
+    other_ = 0.9 * other_ + !again;
+    same_ = 0.9 * same_ + again;
+    if (!again) single_.add(std::log(in_single_), 1);
+    if (!again && now_ == both) double_.add(std::log(in_now_), 1);
   }
+  if (is_single) last_single_ = next;
   in_now_ = again ? in_now_ + in_single_ : 0;
   now_ = next;
 }
