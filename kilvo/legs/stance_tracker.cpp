@@ -119,7 +119,7 @@ std::array<bool, 2> StanceTracker::carriers(const Contacts& contacts, double dt)
     const double phase = contacts.phase(side) + dt;
     const std::size_t other = 1 - side;
     if (!contacts.on[side] || in[side]) continue;
-    // The impact of a foot that comes down moves what is measured of the other one, too.
+    // The impact of a foot that comes down moves what is measured of the other one, too: it stays, unless it has surely left.
     if (in[other] && phase < config_.entry_delay + entry_time && contacts.probability[other] > 1 - ContactFilter::sure_of_state)
       out[other] = true;
     // It settles first, while the other carries.

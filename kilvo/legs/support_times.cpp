@@ -49,7 +49,7 @@ void ContactFilter::SupportTimes::enter(State next) {
   const bool known = last_single_ != none && walks(), again = known && next == last_single_, is_single = next == left || next == right;
   if (now_ == left || now_ == right) in_single_ = in_now_;
   if (is_single && known) {
-    other_ = 0.9 * other_ + !again;
+    other_ = 0.9 * other_ + !again;  // of the last ten, as the times
     same_ = 0.9 * same_ + again;
     if (!again) single_.add(std::log(in_single_), 1);
     if (!again && now_ == both) double_.add(std::log(in_now_), 1);

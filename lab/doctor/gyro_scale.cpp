@@ -92,9 +92,9 @@ void Examination::examine_gyro_scale(const std::vector<Turn>& turns, const Mount
         true});
 }
 
-// Without it a robot on its legs and IMU alone turns by what the gyro is off.
+// On legs and IMU alone the heading is off by this share of each turn: nothing else measures it.
 void Examination::refine_gyro_scale(const MountFit& fit) {
-  constexpr double method = 1e-3, largest = 3e-3;  // rates of a sensor that clips and vibrates are off by as much
+  constexpr double method = 1e-3, largest = 3e-3;  // what the fit is off by beyond its sigma on rough walks; beyond which it is unknown
   const Eigen::Vector3d x = -fit.gyro_excess, s = fit.gyro_excess_sigma;
   Refinement r = refinement(Sensor::imu, "scale of the gyro's axes", {x.x(), x.y(), x.z()}, {s.x(), s.y(), s.z()}, method, largest, "-");
   const Eigen::Vector3d scale = original_.imu.gyro_scale.cwiseProduct(Eigen::Vector3d::Ones() + r.taken_vector());

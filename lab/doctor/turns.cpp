@@ -199,7 +199,7 @@ class MountResiduals {
   }
 
   static constexpr Eigen::Index plain = 7, all = 22;
-  static constexpr int of_axis[] = {16, 19, 21};  // the gyro's excess about x, y, z
+  static constexpr int of_axis[] = {plain + 9, plain + 12, plain + 14};  // the diagonal of M
 
  private:
   // Once for all parameters but the offset.

@@ -43,8 +43,8 @@ struct MountFit {
   double offset = 0;                               // s: the sensor's stamps plus this are on the IMU's clock
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();  // rad/s
   double explained = 0;
-  Eigen::Vector3d gyro_excess = Eigen::Vector3d::Zero(),
-                  gyro_excess_sigma = Eigen::Vector3d::Constant(INFINITY);  // of each axis, of refine_mount()
+  // By how much more than the sensor the gyro turns about each axis, as a share; known after refine_mount() only.
+  Eigen::Vector3d gyro_excess = Eigen::Vector3d::Zero(), gyro_excess_sigma = Eigen::Vector3d::Constant(INFINITY);
   Eigen::Vector3d rotation_sigma() const { return {fit.sigma(0), fit.sigma(1), fit.sigma(2)}; }
   double offset_sigma() const { return fit.sigma(3); }
 };
