@@ -14,15 +14,16 @@ void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservab
   const PoseCovariance P = sweep.posterior.P.topLeftCorner<6, 6>() + unobservable * sweep.considered * unobservable.transpose();
   const std::uint32_t epoch = error_.epoch_now(T_WI, P);
   lidar_.range_noise = sweep.range_noise;
+  const Eigen::Vector3d lidar_W = T_WI * p_IL_;
   // A few at a time: what is made of them is used while it is in the cache.
   constexpr std::size_t at_once = 32;
   std::vector<Eigen::Vector3d> seen;
   for (std::span<const PointCluster> rest = sweep.clusters; !rest.empty(); rest = rest.subspan(std::min(at_once, rest.size()))) {
     const std::vector<PointGroup> groups = to_world(rest.first(std::min(at_once, rest.size())), T_WI, p_IL_, lidar_);
-    surfaces_.insert(groups, epoch);
+    surfaces_.insert(groups, epoch, lidar_W);
     for (const PointGroup& g : groups) seen.push_back(g.mean);
   }
-  surfaces_.see_through(T_WI * p_IL_, seen);
+  surfaces_.see_through(lidar_W, seen);
   surfaces_.forget(sweep.posterior.x.p);
 }
 

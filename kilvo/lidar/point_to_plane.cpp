@@ -53,6 +53,15 @@ LidarModel::LidarModel(const VoxelMap& map, std::span<const PointCluster> cluste
   rows_of_plane_.reserve(clusters.size());
 }
 
+// The LiDAR is behind the surface, by more than what may be wrong.
+bool LidarModel::is_behind(const VoxelMap::Match& match, const Iterate& at) const {
+  if (!match.one_sided) return false;
+  const Plane& plane = *match.plane;
+  if (plane.distance(at.lidar_W) >= 0) return false;
+  const PointToPlaneRow row = point_to_plane(at.T_WI, p_IL_, plane.normal.cast<double>(), plane.centre);
+  return row.r * row.r > config_.gate * config_.gate * (plane.variance_at(at.lidar_W) + row.J.dot(at.P * row.J));
+}
+
 bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluster, const Iterate& at, Association& out) const {
   const Plane& plane = *match.plane;
   const Eigen::Vector3d p_I = cluster.mean.cast<double>();
@@ -105,17 +114,18 @@ bool LidarModel::associate(std::size_t i, const Iterate& at, Association& out) c
   const PointCluster& cluster = clusters_[i];
   out.plane = nullptr;
   const VoxelMap::Match& place = places_[i].plane;
-  if (place.plane != nullptr && accept(place, cluster, at, out)) return true;
+  if (place.plane != nullptr && !is_behind(place, at) && accept(place, cluster, at, out)) return true;
   bool seen = false;
   const auto try_at = [&](const Eigen::Vector3d& x) {
     return map_.visit_planes(x, [&](const VoxelMap::Match& m) {
+      if (is_behind(m, at)) return false;
       seen = true;
       return accept(m, cluster, at, out);
     });
   };
   const Eigen::Vector3d x = at.T_WI * cluster.mean.cast<double>();
   // Its own voxels hold a surface. If it is another one, at every depth, it is no business of the neighbours.
-  if (place.plane != nullptr) return try_at(x);
+  if (place.plane != nullptr) return try_at(x) || !seen;
   // Nothing known here yet: the nearest neighbour leaf, across the face that the point is closest to.
   const double leaf = map_.leaf_size();
   Eigen::Vector3d offset;
@@ -206,7 +216,7 @@ void LidarModel::add_row(std::size_t i, const SE3& T_WI, Sums& sums) {
 
 Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   const SE3 T_WI = x.pose();
-  const Iterate at{T_WI, prior.topLeftCorner<6, 6>() + common_error_};
+  const Iterate at{T_WI, prior.topLeftCorner<6, 6>() + common_error_, T_WI * p_IL_};
   report_.clusters = static_cast<int>(clusters_.size());
   report_.rejected = workers_.sum(clusters_.size(), at_once, 0, [&](std::size_t first, std::size_t last) {
     int rejected = 0;

@@ -75,10 +75,12 @@ class LidarModel {
   struct Iterate {
     SE3 T_WI;
     PoseCovariance P;
+    Eigen::Vector3d lidar_W;
   };
   void look_up_planes(std::size_t first, std::size_t last, const SE3& T_WI);
   bool associate(std::size_t i, const Iterate& at, Association& out) const;
   void count_rows_of_planes();
+  bool is_behind(const VoxelMap::Match& match, const Iterate& at) const;
   bool accept(const VoxelMap::Match& match, const PointCluster& cluster, const Iterate& at, Association& out) const;
   void add_row(std::size_t i, const SE3& T_WI, Sums& sums);
 

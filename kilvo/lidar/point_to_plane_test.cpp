@@ -179,6 +179,36 @@ TEST(LidarModel, TheErrorOfAPlaneIsSharedByAllItsRows) {
   EXPECT_GT(known, 0.3 / static_cast<double>(plane->offset_variance));
 }
 
+TEST(LidarModel, TheBackOfASurfaceIsAnotherSurface) {
+  const std::vector<Eigen::Vector3d> wall = test::points_on({2.5, 0, 0}, Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ(), 0.02);
+  const std::vector<PointGroup> groups = test::groups_of(wall, 0.25, 0.02);
+  const LidarConfig lidar;
+  const Workers workers;
+  Covariance P = Covariance::Zero();
+  P.diagonal().head<6>().setConstant(1e-4);
+  const auto report_from = [&](const std::optional<Eigen::Vector3d>& seen_from, double x) {
+    VoxelMap map{MapConfig{}};
+    map.insert(groups, 0, seen_from);
+    std::vector<PointXYZI> points;
+    for (const Eigen::Vector3d& p : wall) points.emplace_back(p.x() - x, p.y(), p.z(), 0);
+    const auto clusters = downsample(points, SE3{}, 0.25);
+    LidarModel model(map, clusters, Eigen::Vector3d::Zero(), PoseCovariance::Zero(), lidar, workers);
+    State at;
+    at.p.x() = x;
+    model(at, P);
+    return model.report();
+  };
+  const Eigen::Vector3d before(0, 0, 0);
+  const int all = report_from({}, 1).matched;
+  EXPECT_GT(all, 10);
+  EXPECT_EQ(report_from(before, 1).matched, all);
+  EXPECT_EQ(report_from({}, 5).matched, all) << "two-sided";
+  const RegistrationReport behind = report_from(before, 5);
+  EXPECT_EQ(behind.matched, 0);
+  EXPECT_EQ(behind.rejected, 0) << "nothing is known of that side";
+  EXPECT_EQ(report_from(before, 2.52).matched, all) << "2 cm behind it, the pose known to 1 cm";
+}
+
 TEST(LidarModel, TheInformationByEpochAddsUpToAll) {
   const lab::AnalyticRoom room({});
   VoxelMap map{MapConfig{}};

@@ -126,7 +126,7 @@ void VoxelMap::forget_plane(const Path& path, int level, const Eigen::Vector3d& 
       if (child != no_index) node.moments += nodes_[child].moments;
     }
     node.fitted_count = 0;
-    refit_if_due(node, origin);
+    refit_if_due(node, origin, {});
   }
 }
 

@@ -8,10 +8,15 @@ namespace {
 
 // A plane is fitted again when its points have grown by this factor.
 constexpr double refit_growth = 1.25;
-// A settled plane explains a group whose mean lies within this many standard deviations.
+// What lies within this many standard deviations of a plane may lie on it.
 constexpr double settled_sigmas = 4.0;
 // So many points wait for memory at once; what they wait for must fit the innermost cache.
 constexpr std::size_t together = 32;
+
+bool is_within(const Plane& plane, const Eigen::Vector3d& x, double variance) {
+  const double d = plane.distance(x);
+  return d * d < settled_sigmas * settled_sigmas * (variance + plane.variance_at(x));
+}
 
 Eigen::Vector3d centre_of(VoxelKey key, double size) {
   const auto coordinate = [key](int axis) { return static_cast<double>(coordinate_of(key, axis)) + 0.5; };
@@ -84,7 +89,7 @@ void VoxelMap::first_planes(std::span<const Eigen::Vector3d> points, std::span<M
     }
     walk_in_step<0>({leaves.data(), count}, [&](std::size_t i, std::uint32_t index) {
       const Node& node = nodes_[index];
-      if (node.is_plane) out[first + i] = {&node.plane, index, node.epoch};
+      if (node.is_plane) out[first + i] = {&node.plane, index, node.epoch, node.one_sided};
       return node.is_plane;
     });
   }
@@ -92,22 +97,25 @@ void VoxelMap::first_planes(std::span<const Eigen::Vector3d> points, std::span<M
 
 bool VoxelMap::explains(const Plane& plane, const PointGroup& group) {
   const Eigen::Vector3d n = plane.normal.cast<double>();
-  const double d = plane.distance(group.mean);
-  const double variance =
-      n.dot(group.noise * n) / group.count + static_cast<double>(plane.roughness_variance) + plane.variance_at(group.mean);
-  return d * d < settled_sigmas * settled_sigmas * variance;
+  return is_within(plane, group.mean, n.dot(group.noise * n) / group.count + static_cast<double>(plane.roughness_variance));
 }
 
-void VoxelMap::refit_if_due(Node& node, const Eigen::Vector3d& origin) {
+// A plane keeps its side: that of its first points.
+void VoxelMap::refit_if_due(Node& node, const Eigen::Vector3d& origin, const std::optional<Eigen::Vector3d>& seen_from) {
   const double n = node.moments.count();
   if (n < config_.min_points || n < refit_growth * node.fitted_count) return;
   node.fitted_count = n;
-  const auto plane = fit_plane(node.moments, origin, config_.min_points, config_.max_roughness);
+  auto plane = fit_plane(node.moments, origin, config_.min_points, config_.max_roughness);
+  if (plane) {
+    const bool had_side = node.is_plane && node.one_sided;
+    node.one_sided = had_side || (seen_from && !is_within(*plane, *seen_from, 0));
+    if (had_side ? plane->normal.dot(node.plane.normal) < 0 : seen_from && plane->distance(*seen_from) < 0) plane->normal = -plane->normal;
+    node.plane = *plane;
+  }
   node.is_plane = plane.has_value();
-  if (plane) node.plane = *plane;
 }
 
-void VoxelMap::insert(std::span<const PointGroup> groups, std::uint32_t epoch) {
+void VoxelMap::insert(std::span<const PointGroup> groups, std::uint32_t epoch, const std::optional<Eigen::Vector3d>& seen_from) {
   const double farthest = leaf_size() * static_cast<double>(std::int64_t{1} << (key_bits - 1));  // m: beyond it the key has no bits
   const auto usable = [&](const PointGroup& g) { return g.count > 0 && (g.mean.array().abs() < farthest).all(); };
   std::array<const PointGroup*, together> next;
@@ -126,12 +134,12 @@ void VoxelMap::insert(std::span<const PointGroup> groups, std::uint32_t epoch) {
       if (roots[i] == no_index) roots[i] = index;
       return is_settled(nodes_[index]);
     });
-    for (std::size_t i = 0; i < count; ++i) insert_one(*next[i], leaves[i], roots[i], epoch);
+    for (std::size_t i = 0; i < count; ++i) insert_one(*next[i], leaves[i], roots[i], {epoch, seen_from});
   }
 }
 
-void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32_t root, std::uint32_t epoch) {
-  const auto new_node = [this, epoch] {
+void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32_t root, const Origin& from) {
+  const auto new_node = [this, epoch = from.epoch] {
     const std::uint32_t i = nodes_.take();
     nodes_[i] = Node{};
     nodes_[i].epoch = epoch;
@@ -152,12 +160,12 @@ void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32
     Node& node = nodes_[index];
     const bool settled = is_settled(node);
     if (node.against > 0 && node.is_plane && explains(node.plane, group)) node.against = 0;
-    if (node.moments.count() == 0) node.epoch = epoch;
+    if (node.moments.count() == 0) node.epoch = from.epoch;
     if (settled && explains(node.plane, group)) return;
     if (!settled) {
       node.moments.add(group, origin);
       // Below a plane the moments are kept, for the day it is none any more, but nothing is fitted.
-      if (!above_is_plane) refit_if_due(node, origin);
+      if (!above_is_plane) refit_if_due(node, origin, from.seen_from);
     }
     if (level == depth) return;
     above_is_plane = above_is_plane || (node.is_plane && !settled);

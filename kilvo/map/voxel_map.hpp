@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <vector>
@@ -44,6 +45,7 @@ class VoxelMap {
     const Plane* plane = nullptr;
     std::uint32_t node = 0;
     std::uint32_t epoch = 0;  // of the insertion that began the node
+    bool one_sided = false;   // the surface was seen from the side that the normal points to, from the other one it is another surface
   };
 
   /// Calls f(Match) for each plane whose voxel holds x, from the root voxel down to the sub-voxel, until f returns true.
@@ -58,8 +60,9 @@ class VoxelMap {
   const Plane* plane_at(const Eigen::Vector3d& x) const;
 
   /// Adds groups of points in the world; each must fit within one leaf (edge leaf_size()). Planes are refitted as they grow. Nodes that
-  /// begin now are marked with `epoch`: the caller's name for the pose error that they share.
-  void insert(std::span<const PointGroup> groups, std::uint32_t epoch);
+  /// begin now are marked with `epoch`: the caller's name for the pose error that they share. New planes turn their normals to
+  /// `seen_from` (the LiDAR, in the world); without it they have two sides.
+  void insert(std::span<const PointGroup> groups, std::uint32_t epoch, const std::optional<Eigen::Vector3d>& seen_from = {});
 
   /// The beams from `origin_W` to these `ends` (to some of them, others each time) met nothing before: a plane that beams
   /// keep passing through, and that no group is found on meanwhile, is not there any more and is forgotten with its points.
@@ -88,6 +91,7 @@ class VoxelMap {
   struct alignas(64) Node {
     Plane plane;
     bool is_plane = false;
+    bool one_sided = false;
     std::uint8_t against = 0;  // sweeps with beams that passed through the plane, since points were found on it
     std::uint32_t epoch = 0;
     std::uint32_t children = no_index;  // index of its table of eight; none for leaves and undivided nodes
@@ -127,10 +131,15 @@ class VoxelMap {
   Eigen::Vector3d root_centre(const Leaf& l) const;
   template <std::size_t first_line, class Stop>
   void walk_in_step(std::span<const Leaf> leaves, Stop&& stop) const;
-  void insert_one(const PointGroup& group, const Leaf& leaf, std::uint32_t root, std::uint32_t epoch);
+  // What an insertion's groups have in common.
+  struct Origin {
+    std::uint32_t epoch;
+    const std::optional<Eigen::Vector3d>& seen_from;
+  };
+  void insert_one(const PointGroup& group, const Leaf& leaf, std::uint32_t root, const Origin& from);
   bool is_settled(const Node& node) const { return node.is_plane && node.moments.count() >= config_.full_points; }
   static bool explains(const Plane& plane, const PointGroup& group);
-  void refit_if_due(Node& node, const Eigen::Vector3d& origin);
+  void refit_if_due(Node& node, const Eigen::Vector3d& origin, const std::optional<Eigen::Vector3d>& seen_from);
   // The nodes from a root voxel down to one of them.
   using Path = std::array<std::uint32_t, depth + 1>;
   void trace(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
@@ -160,7 +169,7 @@ bool VoxelMap::visit_planes(const Eigen::Vector3d& x, F&& f) const {
   std::uint32_t index = roots_.find(root_key(leaf));
   for (int level = 0; index != no_index; ++level) {
     const Node& node = nodes_[index];
-    if (node.is_plane && f(Match{&node.plane, index, node.epoch})) return true;
+    if (node.is_plane && f(Match{&node.plane, index, node.epoch, node.one_sided})) return true;
     if (node.children == no_index) return false;
     index = children_[node.children][octant(leaf, level)];
   }

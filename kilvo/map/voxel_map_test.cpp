@@ -143,6 +143,30 @@ TEST(VoxelMap, ASettledPlaneTakesNoMorePointsButOtherSurfacesStillFindTheirPlace
   EXPECT_GE(planes_over(map, {0.1, 0.6, 0.8}), 2);
 }
 
+TEST(VoxelMap, APlaneKeepsTheSideThatItWasSeenFrom) {
+  const auto wall = test::groups_of(test::points_on({0.5, 0, 0}, y_axis, z_axis, spacing), leaf, sigma);
+  const Eigen::Vector3d on_wall(0.5, 0.5, 0.5);
+  for (const double side : {-1, 1}) {
+    VoxelMap map{MapConfig{}};
+    for (int i = 0; i < 2; ++i) {
+      // Half as many points again: the plane is fitted anew, seen from the other side this time.
+      map.insert(wall, 0, Eigen::Vector3d(i == 0 ? 3 * side : -3 * side, 0, 1));
+      map.visit_planes(on_wall, [&](const VoxelMap::Match& m) {
+        EXPECT_TRUE(m.one_sided);
+        EXPECT_GT(side * m.plane->normal.x(), 0.99F) << i;
+        return true;
+      });
+      ASSERT_NE(map.plane_at(on_wall), nullptr);
+    }
+  }
+  VoxelMap map{MapConfig{}};
+  map.insert(wall, 0);
+  map.visit_planes(on_wall, [&](const VoxelMap::Match& m) {
+    EXPECT_FALSE(m.one_sided);
+    return true;
+  });
+}
+
 TEST(VoxelMap, TwoPlanesSeenOneAfterTheOtherAreToldApart) {
   VoxelMap map = map_of(test::points_on({0.1, 0, 0.1}, 0.9 * x_axis, y_axis, spacing));
   map.insert(test::groups_of(test::points_on({0.1, 0, 0.1}, 0.9 * z_axis, y_axis, spacing), leaf, sigma), 8);
