@@ -73,12 +73,22 @@ void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epo
   if (!(A.topLeftCorner<3, 3>().trace() > 0) || !(A.bottomRightCorner<3, 3>().trace() > 0)) return;
   const PoseCovariance inverse = inverse_of_known(A);
   const PoseCovariance G = from_origin(T_WI);
-  PoseCovariance root = PoseCovariance::Zero();
+  PoseCovariance root = PoseCovariance::Zero(), kept_root = PoseCovariance::Zero(), kept = PoseCovariance::Zero();
   for (const EpochInformation& e : epochs) {
-    if (e.epoch < epochs_.size()) root += inverse * e.A * root_of(G * epochs_[e.epoch] * G.transpose());
+    kept += e.kept;
+    if (e.epoch >= epochs_.size()) continue;
+    const PoseCovariance of_epoch = root_of(G * epochs_[e.epoch] * G.transpose());
+    root += inverse * e.A * of_epoch;
+    kept_root += e.kept * of_epoch;
+  }
+  // Standard deviations add along the weak directions.
+  PoseCovariance along_weak = weak * at(T_WI) * weak.transpose();
+  if (!kept.isZero(0)) {
+    kept_root += (weak - kept) * root_of(at(T_WI));
+    along_weak = kept_root * kept_root.transpose();
   }
   const PoseCovariance H = to_origin(T_WI);
-  now_ = H * (root * root.transpose() + inverse * systematic * inverse + weak * at(T_WI) * weak.transpose()) * H.transpose();
+  now_ = H * (root * root.transpose() + inverse * systematic * inverse + along_weak) * H.transpose();
 }
 
 void MapError::seen(const SE3& T_WI, std::span<const EarlierView> views, const PoseCovariance& weak) {

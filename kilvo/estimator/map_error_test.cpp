@@ -57,6 +57,32 @@ TEST(MapError, KeepsItsErrorAlongADirectionThatASweepDoesNotKnow) {
   EXPECT_NEAR(fresh.at({})(3, 3), 1.0, 1e-2);
 }
 
+// What an update takes from planes along a weak direction comes with their error: of planes that are as uncertain as the pose nothing is
+// learnt, of certain ones it is.
+TEST(MapError, WhatIsTakenFromThePlanesAlongAWeakDirectionHasTheirError) {
+  PoseCovariance weak = PoseCovariance::Zero(), blind_along_x = diagonal(1e7, 1e6);
+  weak(3, 3) = 1;
+  blind_along_x(3, 3) = 0;
+  const double taken = 0.2;
+  for (const bool is_old : {false, true}) {
+    MapError error;
+    const std::uint32_t old = error.epoch_now({}, diagonal(1e-8, 1e-6));
+    double P = 0.25, total = 0;  // m^2, along x
+    for (int k = 0; k < 40; ++k) {
+      total = P + error.at({})(3, 3);
+      const std::uint32_t now = error.epoch_now({}, diagonal(1e-8, P));
+      error.registered({}, std::vector<EpochInformation>{{is_old ? old : now, blind_along_x, taken * weak}}, PoseCovariance::Zero(), weak);
+      P *= 1 - taken;
+    }
+    if (is_old) {
+      EXPECT_LT(std::sqrt(total), 0.02);
+    } else {
+      EXPECT_GT(std::sqrt(total), 0.4);
+      EXPECT_LT(std::sqrt(total), 0.7);
+    }
+  }
+}
+
 TEST(MapError, AnEpochLastsWhileTheUncertaintyDoes) {
   MapError error;
   const std::uint32_t first = error.epoch_now(somewhere, diagonal(1e-6, 1e-4));

@@ -9,6 +9,7 @@ void WorldMap::give(VoxelMap map) {
 
 void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservable, bool may_grow) {
   const SE3 T_WI = sweep.posterior.x.pose();
+  if (sweep.carries) error_.lost(T_WI, sweep.released);
   if (sweep.carries && (is_given_ || may_grow)) error_.registered(T_WI, sweep.by_epoch, sweep.systematic, unobservable);
   if (is_given_ || !may_grow) return;
   const PoseCovariance P = sweep.posterior.P.topLeftCorner<6, 6>() + unobservable * sweep.considered * unobservable.transpose();
@@ -33,7 +34,10 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& sca
                                       const PoseCovariance& considered, PointDrops& drops) const {
   const PoseCovariance error = error_at(prior.x.pose());
   const ProcessNoise noise = history.replay().noise_within(prior.t - (end - prior.t), end);
-  Registration sweep = lidar.measure(scan, {end, prior, history.trajectory(), noise, error, alone, considered}, surfaces_, drops);
+  const PoseCovariance released = alone ? lidar.release(prior, error, surfaces_.leaf_size() / 2) : PoseCovariance(PoseCovariance::Zero());
+  Registration sweep =
+      lidar.measure(scan, {end, prior, history.trajectory(), noise, error + released, alone, considered}, surfaces_, drops);
+  sweep.released = released;
   const bool is_surprised = lidar.is_surprised(prior, sweep, error);
   if ((sweep.refused != Reason::fits_nowhere && !is_surprised) || (sweep.refused && !sweep.searched)) return sweep;
   auto doubted = history.doubted(prior.t, end, sweep.refused ? std::nullopt : std::optional((sweep.posterior.x.p - prior.x.p).norm()));

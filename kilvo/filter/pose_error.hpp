@@ -19,6 +19,7 @@ struct EarlierView {
 struct EpochInformation {
   std::uint32_t epoch = 0;
   PoseCovariance A = PoseCovariance::Zero();
+  PoseCovariance kept = PoseCovariance::Zero();  // takes a pose error to what the update takes of it from there along weak directions
 };
 
 /// (theta in the body, error of p) -> twist: phi = R theta, u = dp + p x phi.

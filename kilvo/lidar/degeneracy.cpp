@@ -109,8 +109,23 @@ Matrix6 weak_part(const Degeneracy& d) {
          metres.asDiagonal();
 }
 
-void project_out(const Degeneracy& d, const PoseCovariance& prior, bool alone, Information<6>& info) {
-  if (d.weak_count == 0) return;
+Matrix6 weak_part(const Degeneracy& d, const std::array<double, 6>& share) {
+  const Vector6 metres = to_metres(d.lever);
+  Matrix6 sum = Matrix6::Zero();
+  for (int k = 0; k < d.weak_count; ++k) sum += share[static_cast<std::size_t>(k)] * d.directions.col(k) * d.directions.col(k).transpose();
+  return metres.cwiseInverse().asDiagonal() * sum * metres.asDiagonal();
+}
+
+std::array<double, 6> along_weak(const Degeneracy& d, const Matrix6& A) {
+  const Matrix6 own = scaled(A, d.lever);
+  std::array<double, 6> out{};
+  for (int k = 0; k < d.weak_count; ++k) out[static_cast<std::size_t>(k)] = d.directions.col(k).dot(own * d.directions.col(k));
+  return out;
+}
+
+std::array<double, 6> project_out(const Degeneracy& d, const PoseCovariance& prior, bool alone, Information<6>& info) {
+  std::array<double, 6> taken{};
+  if (d.weak_count == 0) return taken;
   const Vector6 metres = to_metres(d.lever), to_own = metres.cwiseInverse();
   const Matrix6 P = metres.asDiagonal() * prior * metres.asDiagonal();
   Matrix6 A = scaled(info.A, d.lever);
@@ -124,7 +139,9 @@ void project_out(const Degeneracy& d, const PoseCovariance& prior, bool alone, I
     if (const double whole = u.dot(A * u); alone && whole > 0) {
       // Faked rows see no error: of all rows, b = real * error, with the noise of all.
       const double attenuation = std::min(1.0, d.kept[i] / whole);
-      kept_A += d.kept[i] * attenuation / alike * u * u.transpose();
+      const double known = d.kept[i] * attenuation / alike, variance = u.dot(P * u);
+      taken[i] = known * variance / (1 + known * variance);
+      kept_A += known * u * u.transpose();
       kept_b += attenuation / alike * u.dot(b) * u;
     }
     const Matrix6 keep = Matrix6::Identity() - u * u.transpose();
@@ -138,6 +155,7 @@ void project_out(const Degeneracy& d, const PoseCovariance& prior, bool alone, I
   b = common.solve(b).eval();
   info.A = metres.asDiagonal() * (0.5 * (A + A.transpose()) + kept_A) * metres.asDiagonal();
   info.b = metres.asDiagonal() * (b + kept_b);
+  return taken;
 }
 
 }  // namespace kilvo

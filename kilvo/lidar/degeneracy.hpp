@@ -64,9 +64,16 @@ Degeneracy find_degeneracy(const SweepInformation& sweep, double weak_share, con
 /// the weak directions out of an information: A -> K A K', K = (I - W)'.
 PoseCovariance weak_part(const Degeneracy& degeneracy);
 
+/// The same for each direction by itself, times `share`.
+PoseCovariance weak_part(const Degeneracy& degeneracy, const std::array<double, 6>& share);
+
+/// The information along each weak direction, 1/m^2.
+std::array<double, 6> along_weak(const Degeneracy& degeneracy, const PoseCovariance& A);
+
 /// Takes the weak directions out of A and b. They are known to Degeneracy::doubt, so when the prior is uncertain by metres along one of
 /// them, the others are trusted to that fraction of it and no better: else every millimetre measured across would become a decimetre
-/// along. `alone`: nothing else measures along them, and what is confirmed of them is kept, as far as it can be believed.
-void project_out(const Degeneracy& degeneracy, const PoseCovariance& prior, bool alone, Information<6>& info);
+/// along. `alone`: nothing else measures along them, and what is confirmed of them is kept, as far as it can be believed. Returns how
+/// much of each weak direction an update by this information then takes from the map (0 to 1); the rest stays as in the prior.
+std::array<double, 6> project_out(const Degeneracy& degeneracy, const PoseCovariance& prior, bool alone, Information<6>& info);
 
 }  // namespace kilvo

@@ -182,6 +182,27 @@ TEST(Degeneracy, SweepsInARowDoNotLearnWhatNoneOfThemMeasures) {
   EXPECT_LT(std::sqrt(P(5, 5)), 0.01);
 }
 
+// What is kept of a weak direction, and how much of the prior's error along it an update by that replaces.
+TEST(Degeneracy, SaysHowMuchOfAWeakDirectionIsTakenFromTheMap) {
+  SweepInformation sweep;
+  sweep.A.diagonal() << 1e6, 1e6, 1e6, 1e3, 1e6, 1e6;
+  sweep.fake(3, 3) = 200;
+  const Degeneracy d = find_degeneracy(sweep, 0.002, {});
+  ASSERT_EQ(d.weak_count, 1);
+  for (const double sigma : {0.01, 1.0}) {
+    for (const bool alone : {false, true}) {
+      Information<6> info;
+      info.A = sweep.A;
+      const PoseCovariance P = sigma * sigma * PoseCovariance::Identity();
+      const std::array<double, 6> taken = project_out(d, P, alone, info);
+      EXPECT_EQ(taken[0] > 0, alone);
+      EXPECT_NEAR(taken[0], info.A(3, 3) / (info.A(3, 3) + 1 / (sigma * sigma)), 1e-9);
+      EXPECT_NEAR(weak_part(d, taken)(3, 3), taken[0], 1e-9);
+      EXPECT_EQ(taken[1], 0);
+    }
+  }
+}
+
 TEST(Degeneracy, ABendTurnsTheWeakDirection) {
   test::Random random(4);
   BlindDirections blind;

@@ -63,6 +63,20 @@ void LidarPipeline::note_silence(Duration silence) {
   if (is_silence(silence, mount_.rate)) sweeps_to_go_ = std::max(sweeps_to_go_, consistent_sweeps);
 }
 
+PoseCovariance LidarPipeline::release(Estimate& prior, const PoseCovariance& map_error, double reach) const {
+  const PoseCovariance& weak = blind_.part();
+  const auto along_weak = [&weak](const auto& P) { return PoseCovariance(weak * P * weak.transpose()); };
+  const auto sigma_of = [](const PoseCovariance& P) { return std::sqrt(std::max(0.0, P.bottomRightCorner<3, 3>().trace())); };
+  const PoseCovariance along = along_weak(prior.P.topLeftCorner<6, 6>());
+  const double sigma = sigma_of(along), of_map = sigma_of(along_weak(map_error)), beyond = sigma - reach;
+  if (!(beyond > 0)) return PoseCovariance::Zero();
+  Covariance keep = Covariance::Identity();
+  keep.topLeftCorner<6, 6>() -= beyond / sigma * weak;
+  prior.P = (keep * prior.P * keep.transpose()).eval();
+  // It is the same velocity that was wrong before, so that standard deviations add.
+  return along / (sigma * sigma) * (2 * of_map + beyond) * beyond;
+}
+
 Registration LidarPipeline::measure(const LidarScan& scan, const Context& context, const VoxelMap& map, PointDrops& drops) {
   const Estimate& prior = context.prior;
   Registration out;

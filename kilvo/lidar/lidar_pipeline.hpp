@@ -35,6 +35,7 @@ struct Registration {
   std::vector<EpochInformation> by_epoch;              // see LidarModel
   PoseCovariance systematic = PoseCovariance::Zero();  // see LidarModel
   PoseCovariance considered = PoseCovariance::Zero();  // of the pose, beyond the prior's: of a description that is not exact
+  PoseCovariance released = PoseCovariance::Zero();    // see LidarPipeline::release()
 };
 
 class LidarPipeline {
@@ -65,6 +66,9 @@ class LidarPipeline {
     bool alone = false;                                  // neither legs nor images measure what a sweep does not hold
     PoseCovariance considered = PoseCovariance::Zero();  // see Registration
   };
+  /// Along what the last sweep did not know a prior that is more uncertain than `reach` is taken relative to the planes around: which of
+  /// them is the nearest says nothing of an error that is larger. Returns the covariance that is then theirs.
+  PoseCovariance release(Estimate& prior, const PoseCovariance& map_error, double reach) const;
   /// An empty map takes the sweep as it is. `drops`: counts the points that are not used.
   Registration measure(const LidarScan& scan, const Context& context, const VoxelMap& map, PointDrops& drops);
 

@@ -245,5 +245,33 @@ TEST(LidarPipeline, WhatAFoundSweepDoesNotHoldIsSearchedForAgainForTwoSeconds) {
   EXPECT_FALSE(s.measured(whole, prior).searched);
 }
 
+// An error that is larger than what the nearest planes can show is theirs as much as the pose's.
+TEST(LidarPipeline, APriorThatIsUncertainAlongAWeakDirectionIsTakenRelativeToTheMap) {
+  Standing s;
+  Registration sweep;
+  sweep.carries = true;
+  sweep.posterior = s.prior({0, 0, 0}, 0.01);
+  sweep.report.information.A.diagonal() << 1e6, 1e6, 1e6, 1, 1e6, 1e6;
+  sweep.report.degeneracy = find_degeneracy(sweep.report.information, 0.002, {});
+  ASSERT_EQ(sweep.report.degeneracy.weak_count, 1);
+  constexpr double reach = 0.1;
+  Estimate prior = s.prior({0, 0, 0}, 0.3);
+  prior.P(at::p, at::v) = prior.P(at::v, at::p) = 0.5 * 0.3 * 1e-3;
+  const Covariance before = prior.P;
+  EXPECT_EQ(s.pipeline.release(prior, no_error(), reach), no_error()) << "no direction was weak";
+  EXPECT_EQ(prior.P, before);
+  s.pipeline.accept(sweep);
+  const PoseCovariance released = s.pipeline.release(prior, no_error(), reach);
+  EXPECT_NEAR(std::sqrt(prior.P(at::p, at::p)), reach, 1e-6);
+  EXPECT_NEAR(std::sqrt(released(3, 3)), 0.2, 1e-6) << "standard deviations add up to what it was";
+  EXPECT_EQ(prior.P(at::v, at::v), before(at::v, at::v));
+  EXPECT_NEAR(prior.P(at::p, at::v), 0.5 * reach * 1e-3, 1e-9) << "as much of it as before comes from the velocity";
+  EXPECT_NEAR(prior.P(at::p + 1, at::p + 1), before(at::p + 1, at::p + 1), 1e-12);
+  PoseCovariance map_error = released;
+  prior.P(at::p, at::p) = 0.15 * 0.15;
+  map_error += s.pipeline.release(prior, map_error, reach);
+  EXPECT_NEAR(std::sqrt(map_error(3, 3)), 0.25, 1e-6);
+}
+
 }  // namespace lidar_pipeline_test
 }  // namespace kilvo

@@ -246,7 +246,7 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
     report_.degeneracy = find_degeneracy(report_.information, config_.weak_share, blind_ != nullptr ? *blind_ : BlindDirections{});
   }
   first_ = false;
-  project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), keeps_weak_, info);
+  taken_ = project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), keeps_weak_, info);
   return info;
 }
 

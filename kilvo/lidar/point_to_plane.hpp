@@ -96,6 +96,7 @@ class LidarModel {
   std::vector<std::uint16_t> rows_of_plane_;  // of the last evaluation
   const BlindDirections* blind_;
   bool first_ = true, keeps_weak_ = false;
+  std::array<double, 6> taken_{};  // project_out() of the last evaluation
   RegistrationReport report_;
 };
 

@@ -60,12 +60,20 @@ std::vector<EpochInformation> LidarModel::by_epoch() const {
     it->second.emplace_back(a.row.J, a.weight);
   }
   std::vector<EpochInformation> out;
-  const PoseCovariance known = PoseCovariance::Identity() - weak_part(report_.degeneracy);
+  PoseCovariance all = PoseCovariance::Zero();
   for (const auto& [epoch, of_epoch] : rows) {
     OuterSum sum;
     sum.add(of_epoch.data(), of_epoch.size());
-    const PoseCovariance A = sum.lower().selfadjointView<Eigen::Lower>();
-    out.push_back({epoch, known.transpose() * A * known});
+    all += out.emplace_back(epoch, sum.lower().selfadjointView<Eigen::Lower>()).A;
+  }
+  const Degeneracy& d = report_.degeneracy;
+  const PoseCovariance known = PoseCovariance::Identity() - weak_part(d);
+  const std::array<double, 6> of_all = along_weak(d, all);
+  for (EpochInformation& e : out) {
+    std::array<double, 6> share = along_weak(d, e.A);
+    for (std::size_t k = 0; k < share.size(); ++k) share[k] = of_all[k] > 0 ? taken_[k] * share[k] / of_all[k] : 0;
+    e.kept = weak_part(d, share);
+    e.A = (known.transpose() * e.A * known).eval();
   }
   return out;
 }
