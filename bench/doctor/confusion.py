@@ -114,8 +114,10 @@ def mount_cases(config):
         c, key = config["camera"], "camera.T_imu_camera"
         for name, axis, angle in (("rolled by 90", "z", 90), ("yawed by 10", "y", 10), ("rolled by 4", "z", 4)):
             out.append((f"camera {name}", texts(key, R @ rotation(axis, angle)), ["camera_rotation"]))
+        for name, off in (("10 cm ahead", [0.1, 0, 0]), ("10 cm to the side", [0, 0.1, 0]), ("10 cm higher", [0, 0, -0.1]), ("20 cm to the side", [0, -0.2, 0])):
+            out.append((f"camera {name}", texts(key, p=p + off), ["camera_position"]))
         out.append(("camera's rotation inverted", texts(key, R.T), ["camera_inverted", "camera_rotation"]))
-        out.append(("camera's mount on the link", texts(key, link_R @ R, link_R @ p + link_p), ["camera_rotation"]))
+        out.append(("camera's mount on the link", texts(key, link_R @ R, link_R @ p + link_p), ["camera_rotation", "camera_position"]))
         out.append(("camera's cx off by 20 %", [f"camera.cx={1.2 * c['cx']}"], ["camera_principal_point"]))
         out.append(("camera's cy off by 20 %", [f"camera.cy={0.8 * c['cy']}"], ["camera_principal_point"]))
         out.append(("camera's size halved", [f"camera.width={c['width'] // 2}", f"camera.height={c['height'] // 2}"], ["camera_size"]))

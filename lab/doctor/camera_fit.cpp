@@ -95,14 +95,14 @@ std::vector<std::vector<Eigen::Vector4d>> CameraTracks::rays_of(const CameraMoun
   return out;
 }
 
-void CameraTracks::residuals(const CameraGuess& guess, const std::vector<std::vector<Eigen::Vector4d>>& rays, const SO3& R_IC, double focal,
+void CameraTracks::residuals(const CameraGuess& guess, const std::vector<std::vector<Eigen::Vector4d>>& rays, const SE3& T_IC, double focal,
                              double offset, std::size_t stride, Residuals& out) const {
   out.width = 1;
   const double px = 0.5 * (guess.mount.fx + guess.mount.fy) * focal;
   std::vector<Eigen::Vector3d> normals, first;
   for (std::size_t i = 0; i < pairs_.size(); i += stride) {
     const double a = pairs_[i]->from + offset, b = pairs_[i]->to + offset;
-    const SO3 R_12 = R_IC.inverse() * SO3::from_quaternion(gyro_.between(a, b)) * R_IC;
+    const SO3 R_12 = T_IC.R.inverse() * SO3::from_quaternion(gyro_.between(a, b)) * T_IC.R;
     normals.clear(), first.clear();
     for (const Eigen::Vector4d& ray : rays[i]) {
       const Eigen::Vector3d u = Eigen::Vector3d(ray[0] / focal, ray[1] / focal, 1).normalized();
@@ -113,10 +113,7 @@ void CameraTracks::residuals(const CameraGuess& guess, const std::vector<std::ve
     Eigen::Vector3d t = Eigen::Vector3d::Zero();
     if (way_ != nullptr && !way_->empty()) {
       const auto A = way_->at(a, gyro_), B = way_->at(b, gyro_);
-      if (A && B) {
-        const SE3 T_IC{R_IC, guess.mount.T_imu_camera.p};
-        t = ((*A * T_IC).inverse() * (*B * T_IC)).p;
-      }
+      if (A && B) t = ((*A * T_IC).inverse() * (*B * T_IC)).p;
     }
     const bool known = t.norm() > least_image_way;
     t = known ? Eigen::Vector3d(t.normalized()) : direction_of(normals);
@@ -131,7 +128,7 @@ void CameraTracks::residuals(const CameraGuess& guess, const std::vector<std::ve
 double CameraTracks::error(const CameraGuess& guess) const {
   try {
     Residuals r;
-    residuals(guess, rays_of(guess.mount), guess.mount.T_imu_camera.R, 1, guess.offset, std::max<std::size_t>(1, pairs_.size() / 60), r);
+    residuals(guess, rays_of(guess.mount), guess.mount.T_imu_camera, 1, guess.offset, std::max<std::size_t>(1, pairs_.size() / 60), r);
     if (r.groups() < 300) return INFINITY;
     return typical(r);
   } catch (const std::invalid_argument&) {
@@ -140,8 +137,27 @@ double CameraTracks::error(const CameraGuess& guess) const {
 }
 
 CameraFit CameraTracks::fit(const CameraGuess& guess, bool with_focal, bool with_offset) const {
+  return fit(guess, Free{with_focal, with_offset, false});
+}
+
+// Once more from where the first fit ended: a position means another thing with another rotation and focal length.
+CameraFit CameraTracks::fit_with_position(const CameraGuess& guess) const {
+  const CameraFit first = fit(guess, Free{true, true, true});
+  if (!first.fit.good) return first;
+  CameraGuess near = guess;
+  near.mount.T_imu_camera = {first.R_IC, first.p_IC};
+  near.mount.fx *= first.focal;
+  near.mount.fy *= first.focal;
+  near.offset = first.offset;
+  CameraFit out = fit(near, Free{true, true, true});
+  out.focal *= first.focal;
+  return out;
+}
+
+CameraFit CameraTracks::fit(const CameraGuess& guess, const Free& free) const {
   CameraFit out;
   out.R_IC = guess.mount.T_imu_camera.R;
+  out.p_IC = guess.mount.T_imu_camera.p;
   out.offset = guess.offset;
   std::vector<std::vector<Eigen::Vector4d>> rays;
   try {
@@ -149,16 +165,24 @@ CameraFit CameraTracks::fit(const CameraGuess& guess, bool with_focal, bool with
   } catch (const std::invalid_argument&) {
     return out;
   }
-  const auto rows = [&](const Eigen::VectorXd& x, Residuals& r) {
-    residuals(guess, rays, guess.mount.T_imu_camera.R * SO3::Exp(x.head<3>()), std::exp(std::clamp(x[3], -2.0, 2.0)),
-              guess.offset + std::clamp(x[4], -camera_slack, camera_slack), 1, r);
+  const SE3& described = guess.mount.T_imu_camera;
+  const auto mount_at = [&](const Eigen::VectorXd& x) {
+    return SE3{described.R * SO3::Exp(x.head<3>()), free.position ? Eigen::Vector3d(described.p + x.tail<3>()) : described.p};
   };
-  Eigen::VectorXd start = Eigen::VectorXd::Zero(5), prior(5), step(5);
-  prior << INFINITY, INFINITY, INFINITY, with_focal ? 1.0 : 1e-6, with_offset ? 1.0 : 1e-7;
-  step << 1e-3, 1e-3, 1e-3, 1e-3, 5e-4;
+  const auto rows = [&](const Eigen::VectorXd& x, Residuals& r) {
+    residuals(guess, rays, mount_at(x), std::exp(std::clamp(x[3], -2.0, 2.0)), guess.offset + std::clamp(x[4], -camera_slack, camera_slack),
+              1, r);
+  };
+  const int parameters = free.position ? 8 : 5;
+  Eigen::VectorXd start = Eigen::VectorXd::Zero(parameters), prior = Eigen::VectorXd::Ones(parameters),
+                  step = Eigen::VectorXd::Constant(parameters, 1e-3);
+  prior.head<5>() << INFINITY, INFINITY, INFINITY, free.focal ? 1.0 : 1e-6, free.offset ? 1.0 : 1e-7;
+  step[4] = 5e-4;
   out.fit = robust_fit(rows, start, prior, step, 8);
   if (!out.fit.good) return out;
-  out.R_IC = guess.mount.T_imu_camera.R * SO3::Exp(out.fit.x.head<3>());
+  const SE3 found = mount_at(out.fit.x);
+  out.R_IC = found.R;
+  out.p_IC = found.p;
   out.focal = std::exp(out.fit.x[3]);
   out.offset = guess.offset + out.fit.x[4];
   out.error = out.fit.scale;
@@ -176,7 +200,7 @@ CameraFit CameraTracks::fit_any_rotation(const CameraGuess& guess) const {
   std::vector<std::pair<double, SO3>> starts;
   for (const SO3& R : even_rotations()) {
     Residuals r;
-    residuals(guess, rays, R, 1, guess.offset, std::max<std::size_t>(1, pairs_.size() / looked_at), r);
+    residuals(guess, rays, {R, guess.mount.T_imu_camera.p}, 1, guess.offset, std::max<std::size_t>(1, pairs_.size() / looked_at), r);
     starts.emplace_back(typical(r), R);
   }
   std::ranges::sort(starts, {}, [](const auto& start) { return start.first; });

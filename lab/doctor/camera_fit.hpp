@@ -37,11 +37,12 @@ struct CameraGuess {
 };
 
 struct CameraFit {
-  Fit fit;  // rotation (3, camera frame), log of the focal length (1), offset (1)
+  Fit fit;  // rotation (3, camera frame), log of the focal length (1), offset (1); with the position that (3, IMU frame, m)
   SO3 R_IC;
-  double focal = 1;   // times the focal lengths of the guess
-  double offset = 0;  // s
-  double error = 0;   // px, robust standard deviation across the epipolar lines
+  Eigen::Vector3d p_IC = Eigen::Vector3d::Zero();  // m
+  double focal = 1;                                // times the focal lengths of the guess
+  double offset = 0;                               // s
+  double error = 0;                                // px, robust standard deviation across the epipolar lines
 };
 
 class CameraTracks {
@@ -52,13 +53,19 @@ class CameraTracks {
   /// px: robust distance from the epipolar lines under a guess; infinite when it cannot be judged.
   double error(const CameraGuess& guess) const;
   CameraFit fit(const CameraGuess& guess, bool with_focal, bool with_offset) const;
+  /// Of all of it, the position included: the camera turns with the robot, and so goes a way of its own. Only the LiDAR's way shows that.
+  CameraFit fit_with_position(const CameraGuess& guess) const;
   /// The best of all rotations, whatever that of the guess.
   CameraFit fit_any_rotation(const CameraGuess& guess) const;
   /// Offsets at which the images' motion is strong when the gyro's is; the likeliest first.
   std::vector<double> likely_offsets(double reach) const;
 
  private:
-  void residuals(const CameraGuess& guess, const std::vector<std::vector<Eigen::Vector4d>>& rays, const SO3& R_IC, double focal,
+  struct Free {
+    bool focal, offset, position;
+  };
+  CameraFit fit(const CameraGuess& guess, const Free& free) const;
+  void residuals(const CameraGuess& guess, const std::vector<std::vector<Eigen::Vector4d>>& rays, const SE3& T_IC, double focal,
                  double offset, std::size_t stride, Residuals& out) const;
   std::vector<std::vector<Eigen::Vector4d>> rays_of(const CameraMount& mount) const;
 

@@ -73,5 +73,59 @@ TEST(CameraTracks, OfTheRightMountAreAsFarFromTheirLinesAsTheirNoise) {
   EXPECT_NEAR(CameraTracks(seen, gyro, nullptr).error({camera(), 0}), 0.19, 0.06);
 }
 
+// A robot that sways, nods and turns while it walks, with a LiDAR that knows its way.
+TEST(CameraTracks, FindWhereTheCameraIs) {
+  const GyroPath gyro(gyro_samples(), Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
+  const auto turned = [&gyro](double t) { return SO3::from_quaternion(gyro.between(-0.2, t)); };
+  const auto place = [](double t) { return Eigen::Vector3d(0.4 * t, 0.02 * std::sin(6 * t), 0.015 * std::cos(11 * t)); };
+  const auto acceleration = [](double t) { return Eigen::Vector3d(0, -0.72 * std::sin(6 * t), -1.815 * std::cos(11 * t)); };
+  const Eigen::Vector3d g(0, 0, -9.81);
+  std::vector<InertialSample> imu = gyro_samples();
+  for (InertialSample& s : imu) s.accel = turned(s.t).inverse() * (acceleration(s.t) - g);
+  std::vector<SweepPose> poses;
+  for (double t = -0.1; t < seconds + 0.1; t += period) {
+    SweepPose p;
+    p.t = p.begin = p.end = t;
+    p.T_WL = {turned(t), place(t)};
+    p.weakest = 0.3, p.good = true;
+    poses.push_back(p);
+  }
+  const LidarWay way(poses, SE3(), 0, imu, gyro, g, Eigen::Vector3d::Zero());
+  CameraMount mount = camera();
+  mount.T_imu_camera.p = {0.12, -0.05, 0.2};
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> across(-0.6, 0.6), away(2, 6);
+  std::normal_distribution<double> noise(0, 0.2);
+  const Camera model(mount);
+  std::vector<TrackedPair> seen;
+  for (double t = 0; t + period < seconds; t += period) {
+    TrackedPair pair{t, t + period, {}};
+    const SE3 T_12 =
+        (SE3{turned(t), place(t)} * mount.T_imu_camera).inverse() * SE3{turned(t + period), place(t + period)} * mount.T_imu_camera;
+    for (int k = 0; k < 40; ++k) {
+      const double z = away(random);
+      const Eigen::Vector3d first(z * across(random), z * across(random), z);
+      const auto a = model.project(first), b = model.project(T_12.inverse() * first);
+      if (a && b) pair.tracks.push_back({a->cast<float>(), (*b + Eigen::Vector2d(noise(random), noise(random))).cast<float>()});
+    }
+    seen.push_back(std::move(pair));
+  }
+  const CameraTracks tracks(seen, gyro, &way);
+  for (const Eigen::Vector3d& off : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.1, 0, 0), Eigen::Vector3d(0, -0.2, 0.1)}) {
+    CameraMount described = mount;
+    described.T_imu_camera.p += off;
+    const CameraFit fit = tracks.fit_with_position({described, 0});
+    ASSERT_TRUE(fit.fit.good);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(fit.p_IC[i], mount.T_imu_camera.p[i], 0.012) << off.transpose();
+      EXPECT_LT(fit.fit.sigma(5 + i), 0.01) << i;
+    }
+    EXPECT_NEAR(fit.focal, 1, 0.005) << off.transpose();
+  }
+  CameraMount longer = mount;
+  longer.fx *= 1.2, longer.fy *= 1.2;
+  EXPECT_NEAR(tracks.fit_with_position({longer, 0}).focal, 1 / 1.2, 0.005);
+}
+
 }  // namespace camera_fit_test
 }  // namespace kilvo::lab
