@@ -66,8 +66,8 @@ class LidarPipeline {
     bool alone = false;                                  // neither legs nor images measure what a sweep does not hold
     PoseCovariance considered = PoseCovariance::Zero();  // see Registration
   };
-  /// Along what the last sweep did not know a prior that is more uncertain than `reach` is taken relative to the planes around: which of
-  /// them is the nearest says nothing of an error that is larger. Returns the covariance that is then theirs.
+  /// Along what the last sweep did not know a prior that is more uncertain than `reach` is taken relative to the planes around: the
+  /// nearest ones do not show an error that is larger. Returns the covariance that is then theirs.
   PoseCovariance release(Estimate& prior, const PoseCovariance& map_error, double reach) const;
   /// An empty map takes the sweep as it is. `drops`: counts the points that are not used.
   Registration measure(const LidarScan& scan, const Context& context, const VoxelMap& map, PointDrops& drops);
