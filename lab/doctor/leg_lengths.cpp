@@ -212,14 +212,14 @@ void Examination::examine_leg_lengths() {
   }
   double scale = by_way;
   const double legs = legs_under(nullptr).front().foot[0].p[0].norm();
+  const auto expected = [legs](double s) { return (1 - 1 / s) * legs; };
   const auto explains = [&](double s) {
-    const double expected = (1 - 1 / s) * legs;
-    return !height || std::abs(*height - expected) < std::max(leg_height_tolerance, 0.5 * std::abs(expected));
+    return !height || std::abs(*height - expected(s)) < std::max(leg_height_tolerance, 0.5 * std::abs(expected(s)));
   };
   bool scale_wrong = std::abs(scale - 1) > std::max(scale_tolerance, sure * sigma);
   if (scale_wrong && accuse_exchanged_legs(scale, detail_of(scale, sigma, windows, height))) return;
   // The way of a robot that runs, slips or rolls over its soles is not that of its legs, but it stands as high as described.
-  const bool slips = scale_wrong && !explains(scale);
+  const bool slips = scale_wrong && (!explains(scale) || (height && std::abs(*height - expected(scale)) > std::abs(*height)));
   if (slips) {
     scale = 1;
     scale_wrong = false;
