@@ -84,7 +84,8 @@ void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epo
   // Standard deviations add along the weak directions.
   PoseCovariance along_weak = weak * at(T_WI) * weak.transpose();
   if (!kept.isZero(0)) {
-    kept_root += (weak - kept) * root_of(at(T_WI));
+    const PoseCovariance before = at(T_WI);  // singular where one direction is all that is wrong
+    kept_root += (weak - kept) * root_of(before + 1e-12 * before.trace() * PoseCovariance::Identity());
     along_weak = kept_root * kept_root.transpose();
   }
   const PoseCovariance H = to_origin(T_WI);

@@ -24,11 +24,11 @@ class MapError {
 
   /// A sweep was registered with these informations against planes of each epoch; D becomes what their errors do to the pose. They
   /// are taken as fully correlated, which bounds it from above. Along directions that the sweep did not know (`weak`: a pose error
-  /// to its part along them) D stays what it was.
+  /// to its part along them) D stays what it was, but for what the update took from the planes (EpochInformation::kept).
   /// `systematic`: LidarModel::systematic(). Planes of no epoch (of a map that was given) are where they should be.
   void registered(const SE3& T_WI, std::span<const EpochInformation> epochs, const PoseCovariance& systematic, const PoseCovariance& weak);
 
-  /// The map restarts at a pose that is wrong by so much more: nothing ties it to the one before.
+  /// What is around is wrong by so much more: the map restarts there, or the pose is taken relative to it.
   void lost(const SE3& T_WI, const PoseCovariance& more);
 
   /// P + D as a twist at the world's origin.

@@ -34,10 +34,17 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& sca
                                       const PoseCovariance& considered, PointDrops& drops) const {
   const PoseCovariance error = error_at(prior.x.pose());
   const ProcessNoise noise = history.replay().noise_within(prior.t - (end - prior.t), end);
-  const PoseCovariance released = alone ? lidar.release(prior, error, surfaces_.leaf_size() / 2) : PoseCovariance(PoseCovariance::Zero());
+  // The error of a given map is not the drift's.
+  Estimate relative = prior;
+  const PoseCovariance released =
+      alone && !is_given_ ? lidar.release(relative, error, surfaces_.leaf_size() / 2) : PoseCovariance(PoseCovariance::Zero());
   Registration sweep =
-      lidar.measure(scan, {end, prior, history.trajectory(), noise, error + released, alone, considered}, surfaces_, drops);
-  sweep.released = released;
+      lidar.measure(scan, {end, relative, history.trajectory(), noise, error + released, alone, considered}, surfaces_, drops);
+  if (sweep.carries) {
+    sweep.released = released;
+  } else {
+    sweep.posterior = prior;
+  }
   const bool is_surprised = lidar.is_surprised(prior, sweep, error);
   if ((sweep.refused != Reason::fits_nowhere && !is_surprised) || (sweep.refused && !sweep.searched)) return sweep;
   auto doubted = history.doubted(prior.t, end, sweep.refused ? std::nullopt : std::optional((sweep.posterior.x.p - prior.x.p).norm()));

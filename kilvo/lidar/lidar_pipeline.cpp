@@ -65,6 +65,8 @@ void LidarPipeline::note_silence(Duration silence) {
 
 PoseCovariance LidarPipeline::release(Estimate& prior, const PoseCovariance& map_error, double reach) const {
   const PoseCovariance& weak = blind_.part();
+  // A sweep that knew nothing at all showed no planes either.
+  if (weak.isIdentity(0) || needs_search(prior.P, PoseCovariance::Identity() - unknowable_)) return PoseCovariance::Zero();
   const auto along_weak = [&weak](const auto& P) { return PoseCovariance(weak * P * weak.transpose()); };
   const auto sigma_of = [](const PoseCovariance& P) { return std::sqrt(std::max(0.0, P.bottomRightCorner<3, 3>().trace())); };
   const PoseCovariance along = along_weak(prior.P.topLeftCorner<6, 6>());
@@ -73,8 +75,8 @@ PoseCovariance LidarPipeline::release(Estimate& prior, const PoseCovariance& map
   Covariance keep = Covariance::Identity();
   keep.topLeftCorner<6, 6>() -= beyond / sigma * weak;
   prior.P = (keep * prior.P * keep.transpose()).eval();
-  // It is the same velocity that was wrong before, so that standard deviations add.
-  return along / (sigma * sigma) * (2 * of_map + beyond) * beyond;
+  // It is the same velocity that was wrong before, so that standard deviations add; the sum of both variances never falls.
+  return along / (sigma * sigma) * (2 * std::max(of_map, reach) + beyond) * beyond;
 }
 
 Registration LidarPipeline::measure(const LidarScan& scan, const Context& context, const VoxelMap& map, PointDrops& drops) {
@@ -114,6 +116,8 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
   out.report = model.report();
   if (!out.carries) return out;
   out.by_epoch = model.by_epoch();
+  // What was found takes nothing along weak directions.
+  if (out.searched) std::ranges::for_each(out.by_epoch, [](EpochInformation& e) { e.kept.setZero(); });
   out.systematic = model.systematic();
   return out;
 }

@@ -125,8 +125,8 @@ bool LidarModel::associate(std::size_t i, const Iterate& at, Association& out) c
   };
   const Eigen::Vector3d x = at.T_WI * cluster.mean.cast<double>();
   // Its own voxels hold a surface. If it is another one, at every depth, it is no business of the neighbours.
-  if (place.plane != nullptr) return try_at(x) || !seen;
-  // Nothing known here yet: the nearest neighbour leaf, across the face that the point is closest to.
+  if (place.plane != nullptr && (try_at(x) || seen)) return out.plane != nullptr;
+  // Nothing known here yet, or not from this side: the nearest neighbour leaf, across the face that the point is closest to.
   const double leaf = map_.leaf_size();
   Eigen::Vector3d offset;
   for (int k = 0; k < 3; ++k) offset[k] = x[k] - (static_cast<double>(fast_floor(x[k] / leaf)) + 0.5) * leaf;

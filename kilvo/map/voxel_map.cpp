@@ -100,7 +100,7 @@ bool VoxelMap::explains(const Plane& plane, const PointGroup& group) {
   return is_within(plane, group.mean, n.dot(group.noise * n) / group.count + static_cast<double>(plane.roughness_variance));
 }
 
-// A plane keeps its side: that of its first points.
+// A plane keeps its side: that of the first fit that is certain of it.
 void VoxelMap::refit_if_due(Node& node, const Eigen::Vector3d& origin, const std::optional<Eigen::Vector3d>& seen_from) {
   const double n = node.moments.count();
   if (n < config_.min_points || n < refit_growth * node.fitted_count) return;

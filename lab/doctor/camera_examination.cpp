@@ -82,7 +82,7 @@ bool Examination::examine_camera_position(const CameraTracks& tracks, const Came
   const std::string detail =
       fmt::format("measured {} m, standard deviations {}, described {}", in_metres(placed.p_IC), in_metres(sigma), in_metres(described));
   // Along the view the place is known least: on rough walks a right one was 7 cm off, by 6 standard deviations of the scatter.
-  constexpr double tolerance = 0.05, sure_of_position = 5, method = 0.02, largest = 0.04;  // m, -, m, m
+  constexpr double tolerance = 0.05, sure_of_position = 5, method = 0.03, largest = 0.04;  // m, -, m, m
   bool wrong = false;
   for (int i = 0; i < 3; ++i) wrong |= std::abs(error[i]) > tolerance + sure_of_position * sigma[i];
   if (!wrong) {
@@ -93,12 +93,15 @@ bool Examination::examine_camera_position(const CameraTracks& tracks, const Came
     check(Sensor::camera, "position of the mount", sigma.maxCoeff() > tolerance ? Check::Verdict::unknown : Check::Verdict::good, detail);
     return false;
   }
-  if (seems_wrong(Sensor::lidar)) return false;
+  const bool found_before = std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "camera_position"; });
+  if (found_before || seems_wrong(Sensor::lidar)) return false;
   const double angle = degrees(fit.fit.x.head<3>().norm());
-  if (angle > camera_rotation_tolerance && accuse_principal_point(tracks, fit, placed.error)) return true;
+  const double uncertain = degrees(Eigen::Vector3d(fit.fit.sigma(0), fit.fit.sigma(1), fit.fit.sigma(2)).norm());
+  if (angle > std::max(camera_rotation_tolerance, sure * uncertain) && angle < 15 && accuse_principal_point(tracks, fit, placed.error))
+    return true;
   Eigen::Vector3d right = described;
   for (int i = 0; i < 3; ++i) {
-    if (std::abs(error[i]) > std::max(sure * sigma[i], method)) right[i] = std::round(1e3 * placed.p_IC[i]) / 1e3;
+    if (std::abs(error[i]) > tolerance + sure_of_position * sigma[i]) right[i] = std::round(1e3 * placed.p_IC[i]) / 1e3;
   }
   find({Sensor::camera,
         "camera_position",
