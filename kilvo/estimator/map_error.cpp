@@ -82,9 +82,10 @@ void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epo
     kept_root += e.kept * of_epoch;
   }
   // Standard deviations add along the weak directions.
-  PoseCovariance along_weak = weak * at(T_WI) * weak.transpose();
+  const PoseCovariance before = at(T_WI);
+  PoseCovariance along_weak = weak * before * weak.transpose();
   if (!kept.isZero(0)) {
-    const PoseCovariance before = at(T_WI);  // singular where one direction is all that is wrong
+    // Padded: it is singular where one direction is all that is wrong.
     kept_root += (weak - kept) * root_of(before + 1e-12 * before.trace() * PoseCovariance::Identity());
     along_weak = kept_root * kept_root.transpose();
   }

@@ -40,11 +40,8 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& sca
       alone && !is_given_ ? lidar.release(relative, error, surfaces_.leaf_size() / 2) : PoseCovariance(PoseCovariance::Zero());
   Registration sweep =
       lidar.measure(scan, {end, relative, history.trajectory(), noise, error + released, alone, considered}, surfaces_, drops);
-  if (sweep.carries) {
-    sweep.released = released;
-  } else {
-    sweep.posterior = prior;
-  }
+  if (sweep.carries) sweep.released = released;
+  if (!sweep.carries) sweep.posterior = prior;
   const bool is_surprised = lidar.is_surprised(prior, sweep, error);
   if ((sweep.refused != Reason::fits_nowhere && !is_surprised) || (sweep.refused && !sweep.searched)) return sweep;
   auto doubted = history.doubted(prior.t, end, sweep.refused ? std::nullopt : std::optional((sweep.posterior.x.p - prior.x.p).norm()));

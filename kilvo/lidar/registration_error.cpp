@@ -70,9 +70,11 @@ std::vector<EpochInformation> LidarModel::by_epoch() const {
   const PoseCovariance known = PoseCovariance::Identity() - weak_part(d);
   const std::array<double, 6> of_all = along_weak(d, all);
   for (EpochInformation& e : out) {
-    std::array<double, 6> share = along_weak(d, e.A);
-    for (std::size_t k = 0; k < share.size(); ++k) share[k] = of_all[k] > 0 ? taken_[k] * share[k] / of_all[k] : 0;
-    e.kept = weak_part(d, share);
+    if (keeps_weak_) {
+      std::array<double, 6> share = along_weak(d, e.A);
+      for (std::size_t k = 0; k < share.size(); ++k) share[k] = of_all[k] > 0 ? taken_[k] * share[k] / of_all[k] : 0;
+      e.kept = weak_part(d, share);
+    }
     e.A = (known.transpose() * e.A * known).eval();
   }
   return out;

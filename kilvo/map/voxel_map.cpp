@@ -9,13 +9,13 @@ namespace {
 // A plane is fitted again when its points have grown by this factor.
 constexpr double refit_growth = 1.25;
 // What lies within this many standard deviations of a plane may lie on it.
-constexpr double settled_sigmas = 4.0;
+constexpr double on_plane_sigmas = 4.0;
 // So many points wait for memory at once; what they wait for must fit the innermost cache.
 constexpr std::size_t together = 32;
 
 bool is_within(const Plane& plane, const Eigen::Vector3d& x, double variance) {
   const double d = plane.distance(x);
-  return d * d < settled_sigmas * settled_sigmas * (variance + plane.variance_at(x));
+  return d * d < on_plane_sigmas * on_plane_sigmas * (variance + plane.variance_at(x));
 }
 
 Eigen::Vector3d centre_of(VoxelKey key, double size) {
@@ -138,8 +138,8 @@ void VoxelMap::insert(std::span<const PointGroup> groups, std::uint32_t epoch, c
   }
 }
 
-void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32_t root, const Origin& from) {
-  const auto new_node = [this, epoch = from.epoch] {
+void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32_t root, const Insertion& insertion) {
+  const auto new_node = [this, epoch = insertion.epoch] {
     const std::uint32_t i = nodes_.take();
     nodes_[i] = Node{};
     nodes_[i].epoch = epoch;
@@ -160,12 +160,12 @@ void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32
     Node& node = nodes_[index];
     const bool settled = is_settled(node);
     if (node.against > 0 && node.is_plane && explains(node.plane, group)) node.against = 0;
-    if (node.moments.count() == 0) node.epoch = from.epoch;
+    if (node.moments.count() == 0) node.epoch = insertion.epoch;
     if (settled && explains(node.plane, group)) return;
     if (!settled) {
       node.moments.add(group, origin);
       // Below a plane the moments are kept, for the day it is none any more, but nothing is fitted.
-      if (!above_is_plane) refit_if_due(node, origin, from.seen_from);
+      if (!above_is_plane) refit_if_due(node, origin, insertion.seen_from);
     }
     if (level == depth) return;
     above_is_plane = above_is_plane || (node.is_plane && !settled);

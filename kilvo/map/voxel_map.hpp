@@ -132,11 +132,11 @@ class VoxelMap {
   template <std::size_t first_line, class Stop>
   void walk_in_step(std::span<const Leaf> leaves, Stop&& stop) const;
   // What an insertion's groups have in common.
-  struct Origin {
+  struct Insertion {
     std::uint32_t epoch;
     const std::optional<Eigen::Vector3d>& seen_from;
   };
-  void insert_one(const PointGroup& group, const Leaf& leaf, std::uint32_t root, const Origin& from);
+  void insert_one(const PointGroup& group, const Leaf& leaf, std::uint32_t root, const Insertion& insertion);
   bool is_settled(const Node& node) const { return node.is_plane && node.moments.count() >= config_.full_points; }
   static bool explains(const Plane& plane, const PointGroup& group);
   void refit_if_due(Node& node, const Eigen::Vector3d& origin, const std::optional<Eigen::Vector3d>& seen_from);

@@ -12,6 +12,12 @@ constexpr double camera_rotation_tolerance = 2;    // degrees
 constexpr double focal_tolerance = 0.06;           // of the focal length
 constexpr double camera_clock_tolerance = 0.0045;  // s
 
+Eigen::Vector3d rotation_sigma(const CameraFit& fit) { return {fit.fit.sigma(0), fit.fit.sigma(1), fit.fit.sigma(2)}; }
+
+bool is_turned(const CameraFit& fit) {
+  return degrees(fit.fit.x.head<3>().norm()) > std::max(camera_rotation_tolerance, sure * degrees(rotation_sigma(fit).norm()));
+}
+
 }  // namespace
 
 void Examination::examine_camera() {
@@ -95,10 +101,7 @@ bool Examination::examine_camera_position(const CameraTracks& tracks, const Came
   }
   const bool found_before = std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "camera_position"; });
   if (found_before || seems_wrong(Sensor::lidar)) return false;
-  const double angle = degrees(fit.fit.x.head<3>().norm());
-  const double uncertain = degrees(Eigen::Vector3d(fit.fit.sigma(0), fit.fit.sigma(1), fit.fit.sigma(2)).norm());
-  if (angle > std::max(camera_rotation_tolerance, sure * uncertain) && angle < 15 && accuse_principal_point(tracks, fit, placed.error))
-    return true;
+  if (is_turned(fit) && accuse_principal_point(tracks, fit, placed.error)) return true;
   Eigen::Vector3d right = described;
   for (int i = 0; i < 3; ++i) {
     if (std::abs(error[i]) > tolerance + sure_of_position * sigma[i]) right[i] = std::round(1e3 * placed.p_IC[i]) / 1e3;
@@ -122,6 +125,8 @@ bool Examination::examine_camera_position(const CameraTracks& tracks, const Came
 bool Examination::accuse_principal_point(const CameraTracks& tracks, const CameraFit& fit, double other) {
   const CameraMount& m = robot_.camera;
   const Eigen::Vector3d turn = fit.fit.x.head<3>();
+  constexpr double largest_turn = 15;  // degrees
+  if (degrees(turn.norm()) >= largest_turn) return false;
   CameraMount best = m;
   double error = 0.97 * std::min(fit.error, other), least = 0.3 * turn.norm();
   for (const double side : {1.0, -1.0}) {
@@ -158,7 +163,7 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
     check(Sensor::camera, "mount, intrinsics, clock", Check::Verdict::unknown, "too few tracks");
     return;
   }
-  const Eigen::Vector3d sigma(fit.fit.sigma(0), fit.fit.sigma(1), fit.fit.sigma(2));
+  const Eigen::Vector3d sigma = rotation_sigma(fit);
   const double angle = degrees(fit.fit.x.head<3>().norm()), uncertain = degrees(sigma.norm());
   const std::string evidence = fmt::format("corners of the images are {:.2f} px from their epipolar lines", fit.error);
   const std::string rotation =
@@ -177,8 +182,8 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
                {"camera.fy", fmt::format("{:.3f}", (1 + r.taken[0]) * robot_.camera.fy)}};
   refinements_.push_back(std::move(r));
   refine_offset(Sensor::camera, fit.offset, fit.fit.sigma(4), clock_method);
-  if (angle > std::max(camera_rotation_tolerance, sure * uncertain) && angle < 15 && accuse_principal_point(tracks, fit, fit.error)) return;
-  if (angle > std::max(camera_rotation_tolerance, sure * uncertain)) {
+  if (is_turned(fit) && accuse_principal_point(tracks, fit, fit.error)) return;
+  if (is_turned(fit)) {
     std::erase_if(diagnosis_.findings, [](const Finding& x) { return x.cause == "camera_rotation"; });
     accuse_camera_rotation(fit.R_IC, rotation);
   } else {
