@@ -104,6 +104,7 @@ Json points_json(const RunFacts& facts, const lab::RecordingSource& source, cons
            {"at_origin", drops.at_origin},
            {"too_near", drops.too_near},
            {"too_far", drops.too_far},
+           {"own_body", drops.own_body},
            {"outside_trajectory", drops.outside_trajectory}};
   out["absurd_time"] = source.counts(Sensor::lidar).absurd_point_times;
   out["in_map"] = facts.map_points;

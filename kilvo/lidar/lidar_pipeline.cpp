@@ -57,7 +57,7 @@ bool contradicts_map(const RegistrationReport& report) {
 }  // namespace
 
 LidarPipeline::LidarPipeline(const LidarMount& mount, const LidarConfig& config, const UpdateConfig& update, int threads)
-    : mount_(mount), config_(config), update_(update), workers_(threads) {}
+    : mount_(mount), config_(config), update_(update), workers_(threads), own_body_(mount.own_body) {}
 
 void LidarPipeline::note_silence(Duration silence) {
   if (is_silence(silence, mount_.rate)) sweeps_to_go_ = std::max(sweeps_to_go_, consistent_sweeps);
@@ -84,7 +84,8 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
   Registration out;
   out.posterior = prior;
   out.considered = context.considered;
-  out.points = undistort(scan, context.trajectory, prior.t, mount_, drops);
+  out.points = undistort(scan, context.trajectory, prior.t, mount_, drops, &own_body_);
+  own_body_.learn(prior.x.pose());
   if (out.points.empty()) {
     out.refused = Reason::no_usable_point;
     return out;

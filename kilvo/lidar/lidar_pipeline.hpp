@@ -115,6 +115,7 @@ class LidarPipeline {
   LidarConfig config_;
   UpdateConfig update_;
   Workers workers_;
+  OwnBody own_body_;
   Time begins_at_{};
   TimeOffset time_offset_;
   MountError mount_error_;

@@ -46,6 +46,7 @@ std::vector<Pair> relative_poses(const Trajectory& trajectory, const SE3& T_IW, 
 // What a point must satisfy.
 struct Limits {
   float nearest2, farthest2;  // m^2
+  float beyond_body2;         // m^2: nearer points are looked at one by one
   std::int64_t base, span;    // ns: of a scan's time on the grid, and how long the grid is
 };
 
@@ -106,7 +107,7 @@ constexpr float inverse_step = 1.0f / static_cast<float>(step_ns);
   transpose(x);
   const Float4 range2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2];
   const Int4 usable =
-      (range2 >= limits.nearest2) & (range2 <= limits.farthest2) & (since >= 0) & (since < static_cast<int>(step.end - step.begin));
+      (range2 > limits.beyond_body2) & (range2 <= limits.farthest2) & (since >= 0) & (since < static_cast<int>(step.end - step.begin));
   if (!all(usable)) return false;
   const Float4 s = __builtin_convertvector(since, Float4) * inverse_step;
   const Pair& pair = *step.pair;
@@ -125,8 +126,8 @@ constexpr float inverse_step = 1.0f / static_cast<float>(step_ns);
 }
 
 // Writes the points that can be used; how many.
-KILVO_WIDE std::size_t move_points(std::span<const LidarPoint> points, const Pair* pairs, const Limits& limits, PointDrops& drops,
-                                   PointXYZI* out) {
+KILVO_WIDE std::size_t move_points(std::span<const LidarPoint> points, const Pair* pairs, const Limits& limits, OwnBody* body,
+                                   PointDrops& drops, PointXYZI* out) {
   Step step;
   std::size_t used = 0, i = 0;
   while (i < points.size()) {
@@ -142,6 +143,10 @@ KILVO_WIDE std::size_t move_points(std::span<const LidarPoint> points, const Pai
       count_drop(p, limits, drops);
       continue;
     }
+    if (range2 <= limits.beyond_body2 && body != nullptr && body->meets(p)) {
+      ++drops.own_body;
+      continue;
+    }
     step = step_of(p.offset_ns, pairs, limits);
     const Float4 x = moved(p, step);
     std::memcpy(out[used++].data(), &x, sizeof(x));
@@ -154,7 +159,8 @@ constexpr Duration slack = std::chrono::milliseconds(5);
 
 }  // namespace
 
-std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajectory, Time at, const LidarMount& mount, PointDrops& drops) {
+std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajectory, Time at, const LidarMount& mount, PointDrops& drops,
+                                 OwnBody* body) {
   std::vector<PointXYZI> out;
   const auto T_WI = trajectory.at(at);
   if (!T_WI) {
@@ -182,10 +188,11 @@ std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajec
   }
   const auto count = static_cast<std::size_t>((latest - earliest) / step_ns) + 1;
   const std::vector<Pair> pairs = relative_poses(trajectory, T_WI->inverse(), mount.T_imu_lidar, scan.t + Duration(earliest), count);
-  const Limits limits{static_cast<float>(mount.min_range * mount.min_range), static_cast<float>(mount.max_range * mount.max_range),
-                      -earliest, latest - earliest};
+  const auto nearest = static_cast<float>(mount.min_range), farthest = static_cast<float>(mount.max_range);
+  const float beyond_body = body == nullptr ? nearest : std::max(nearest, body->reach());
+  const Limits limits{nearest * nearest, farthest * farthest, beyond_body * beyond_body, -earliest, latest - earliest};
   out.resize(scan.points.size());
-  out.resize(move_points(scan.points, pairs.data(), limits, drops, out.data()));
+  out.resize(move_points(scan.points, pairs.data(), limits, body, drops, out.data()));
   return out;
 }
 

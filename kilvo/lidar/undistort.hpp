@@ -7,6 +7,7 @@
 
 #include "kilvo/filter/predict.hpp"
 #include "kilvo/filter/trajectory.hpp"
+#include "kilvo/lidar/own_body.hpp"
 #include "kilvo/sensors/measurement.hpp"
 #include "kilvo/sensors/robot.hpp"
 
@@ -17,12 +18,14 @@ using PointXYZI = Eigen::Vector4f;
 
 /// Points that were not used, by cause.
 struct PointDrops {
-  std::uint32_t non_finite = 0, at_origin = 0, too_near = 0, too_far = 0, outside_trajectory = 0;
+  std::uint32_t non_finite = 0, at_origin = 0, too_near = 0, too_far = 0, own_body = 0, outside_trajectory = 0;
 };
 
 /// A scan's points in the IMU frame of time `at`, by their relative motion along `trajectory`; both ends of the scan and `at` should
-/// lie within it. Points without a pose (up to `slack` outside is taken as the end pose) are dropped and counted.
-std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajectory, Time at, const LidarMount& mount, PointDrops& drops);
+/// lie within it. Points without a pose (up to `slack` outside is taken as the end pose) and of the robot's own `body` are dropped and
+/// counted.
+std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajectory, Time at, const LidarMount& mount, PointDrops& drops,
+                                 OwnBody* body = nullptr);
 
 /// What the IMU's noise within a scan, seen from its middle, does to the pose that its points tell. Of (rotation, position), common to all
 /// points.

@@ -55,17 +55,22 @@ struct LegsMount {
 };
 
 struct LidarMount {
-  double rate = 10;        // Hz, nominal
-  double time_offset = 0;  // s, added to the stamps
-  double min_range = 0.3;  // m
-  double max_range = 100;  // m
+  double rate = 10;              // Hz, nominal
+  double time_offset = 0;        // s, added to the stamps
+  double min_range = 0.3;        // m
+  double max_range = 100;        // m
+  std::vector<double> own_body;  // boxes around parts of the robot, in the LiDAR's frame, m
   SE3 T_imu_lidar;
 
   static constexpr auto fields() {
-    return std::tuple{Field{"rate", &LidarMount::rate, "Hz", "nominal rate of the scans"},
-                      Field{"time_offset", &LidarMount::time_offset, "s", "added to the stamps of the scans and of their points"},
-                      Field{"min_range", &LidarMount::min_range, "m", "nearer points are dropped"},
-                      Field{"max_range", &LidarMount::max_range, "m", "farther points are dropped"}};
+    return std::tuple{
+        Field{"rate", &LidarMount::rate, "Hz", "nominal rate of the scans"},
+        Field{"time_offset", &LidarMount::time_offset, "s", "added to the stamps of the scans and of their points"},
+        Field{"min_range", &LidarMount::min_range, "m", "nearer points are dropped"},
+        Field{"max_range", &LidarMount::max_range, "m", "farther points are dropped"},
+        Field{"own_body", &LidarMount::own_body, "m",
+              "boxes around parts of the robot, in the LiDAR's frame: x, y, z of the least corner, then of the greatest; points in "
+              "them are dropped. What is nearer than 0.8 m and goes along with the robot is found without"}};
   }
 };
 

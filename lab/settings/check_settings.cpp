@@ -65,6 +65,14 @@ void check_together(const Settings& s, Problems& problems) {
     complain(touched("lidar.min_range", "lidar.max_range"),
              fmt::format("lidar.min_range ({}) must be below lidar.max_range ({})", lidar.min_range, lidar.max_range));
   }
+  const std::vector<double>& body = lidar.own_body;
+  if (body.size() % 6 != 0) complain("lidar.own_body", fmt::format("must have 6 numbers for each box, not {} in all", body.size()));
+  for (std::size_t k = 0; k + 6 <= body.size(); k += 6) {
+    for (std::size_t axis = k; axis < k + 3; ++axis)
+      if (!(body[axis] < body[axis + 3]))
+        complain("lidar.own_body", fmt::format("box {}: the least corner ({:g}) must be below the greatest ({:g}) along {}", k / 6 + 1,
+                                               body[axis], body[axis + 3], "xyz"[axis - k]));
+  }
   const MapConfig& map = s.estimator.map;
   if (map.full_points < map.min_points) {
     complain(touched("map.full_points", "map.min_points"),

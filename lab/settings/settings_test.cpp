@@ -190,6 +190,10 @@ TEST(Settings, RangesAreCheckedAlsoTogether) {
   EXPECT_THAT(error_of("lidar:\n  min_range: 5\n  max_range: 4\n"), HasSubstr("must be below lidar.max_range"));
   EXPECT_THAT(error_of("legs: {type: joint}"), HasSubstr("must be one of joints, feet, not 'joint', nearest is joints"));
   EXPECT_THAT(error_of("camera: {distortion: [1, 2, 3]}"), HasSubstr("must have 4 or 5 numbers"));
+  EXPECT_THAT(error_of("lidar: {own_body: [0, 0, 0, 1, 1]}"), HasSubstr("must have 6 numbers for each box, not 5"));
+  EXPECT_THAT(error_of("lidar: {own_body: [0, 0, 0, 1, 1, 1, 0, 2, 0, 1, 1, 1]}"),
+              HasSubstr("box 2: the least corner (2) must be below the greatest (1) along y"));
+  EXPECT_NO_THROW(parse("lidar: {own_body: [0, 0, 0, 1, 1, 1]}"));
   for (const char* name : {"/kilvo", "kilvo/", "my robot", "a//b", "2nd"}) {
     EXPECT_THAT(error_of(std::string("live: {name: '") + name + "'}"), HasSubstr("live.name: must be a name of ROS")) << name;
   }
