@@ -157,6 +157,7 @@ Diagnosis Examination::run() {
     return diagnosis_;
   }
   examine_acceleration_unit();
+  examine_frozen_gyro();
   register_sweeps();
   agree_with_gyro();
   settle_axes();

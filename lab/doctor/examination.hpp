@@ -81,6 +81,8 @@ class Examination {
   void settle_axes();
   void examine_gyro_scale(const std::vector<Turn>& turns, const MountFit& fit);
   void refine_gyro_scale(const MountFit& fit);
+  void examine_gyro_axes(const Eigen::Vector3d& change, const Eigen::Vector3d& sigma);
+  void examine_frozen_gyro();
   void accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence);
   /// `only_calm`: none when what the accelerometer measures does not average to gravity.
   std::optional<double> tilt_under(const SO3& R_link_imu, bool only_calm) const;
@@ -152,6 +154,9 @@ class Examination {
   bool accuse_lidar_instead(double scale, const std::string& evidence);
   void accuse_leg_lengths(double scale, double height);
   void accuse_imu_place(double height);
+  void accuse_leg_joints(const std::string& evidence);
+  static bool is_no_way_of_legs(double scale, double sigma);
+  bool way_contradicts_legs(const std::string& evidence);
   void accuse_uneven_legs(double uneven);
   std::optional<double> soles_above_ankles() const;
   std::string link_at_height(double height) const;

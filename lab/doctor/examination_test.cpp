@@ -170,6 +170,21 @@ TEST(Doctor, TheScaleOfAnAxisOfTheGyroIsMeasured) {
   EXPECT_FALSE(scale_of_gyro(1).is_taken());
 }
 
+TEST(Doctor, AnAxisOfTheGyroThatIsFrozenOrOfAnotherScaleIsNamed) {
+  Recorded scaled = walked().recorded;
+  for (InertialSample& s : scaled.imu) s.gyro.z() *= 0.95;
+  const Diagnosis diagnosis = Examination(scaled, walked().robot).run();
+  ASSERT_EQ(diagnosis.findings.size(), 1U);
+  EXPECT_EQ(diagnosis.findings[0].cause, "gyro_unit");
+  ASSERT_EQ(diagnosis.findings[0].changes.size(), 1U);
+  EXPECT_EQ(diagnosis.findings[0].changes[0].key, "imu.gyro_scale");
+  EXPECT_NEAR(diagnosis.findings[0].size, 0.95, 0.01);
+  Recorded frozen = walked().recorded;
+  frozen.sweeps.clear();
+  for (InertialSample& s : frozen.imu) s.gyro.setZero();
+  EXPECT_THAT(causes(frozen, walked().robot), Contains("gyro_frozen"));
+}
+
 TEST(Doctor, AGyroInDegreesIsNamedByTheLidarAlone) {
   Recorded recorded = walked().recorded;
   recorded.legs.clear();
@@ -222,6 +237,36 @@ TEST(Doctor, LegsAreNamedWithTheJoint) {
 std::size_t place_of(const std::string& joint) {
   const std::vector<std::string>& names = walked().recorded.joint_names;
   return static_cast<std::size_t>(std::ranges::find(names, joint) - names.begin());
+}
+
+TEST(Doctor, JointsThatAreExchangedAreNamed) {
+  const std::array<std::array<const char*, 2>, 4> exchanged{{{"left_knee_joint", "right_knee_joint"},
+                                                             {"left_hip_yaw_joint", "right_hip_yaw_joint"},
+                                                             {"left_ankle_pitch_joint", "right_ankle_pitch_joint"},
+                                                             {"left_hip_roll_joint", "right_hip_roll_joint"}}};
+  for (const auto& [a, b] : exchanged) {
+    Recorded recorded = walked().recorded;
+    for (LegSample& s : recorded.legs) std::swap(s.position.at(place_of(a)), s.position.at(place_of(b)));
+    EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("joints_exchanged")) << a;
+  }
+}
+
+TEST(Doctor, LegsThatMakeNoSenseUnderAnyChangeAreNamed) {
+  // Knees that bend to the side.
+  Robot robot = walked().robot;
+  for (const char* knee : {"\"left_knee_joint\"", "\"right_knee_joint\""}) {
+    const std::size_t axis = robot.urdf.find("<axis xyz=\"", robot.urdf.find(knee));
+    ASSERT_LT(axis, robot.urdf.size());
+    const std::size_t begin = robot.urdf.find('"', axis) + 1, end = robot.urdf.find('"', begin);
+    robot.urdf.replace(begin, end - begin, "1 0 0");
+  }
+  EXPECT_THAT(causes(walked().recorded, robot), ElementsAre("leg_joints"));
+}
+
+TEST(Doctor, ALidarAFewCentimetresAsideIsNamedAndNotTheImu) {
+  Robot robot = walked().robot;
+  robot.lidar.T_imu_lidar.p += Eigen::Vector3d(0.03, 0, 0);
+  EXPECT_THAT(causes(walked().recorded, robot), ElementsAre("lidar_position"));
 }
 
 TEST(Doctor, ALegThatIsMirroredIsNamed) {

@@ -100,6 +100,54 @@ void Examination::refine_gyro_scale(const MountFit& fit) {
   const Eigen::Vector3d scale = original_.imu.gyro_scale.cwiseProduct(Eigen::Vector3d::Ones() + r.taken_vector());
   r.changes = {{"imu.gyro_scale", fmt::format("[{:.5f}, {:.5f}, {:.5f}]", scale.x(), scale.y(), scale.z())}};
   refinements_.push_back(std::move(r));
+  examine_gyro_axes(x, s);
+}
+
+// One axis of it: a factor of the driver, a sensor that is broken.
+void Examination::examine_gyro_axes(const Eigen::Vector3d& change, const Eigen::Vector3d& sigma) {
+  constexpr double tolerance = 0.03;
+  Eigen::Index worst = 0;
+  const double most = change.cwiseAbs().maxCoeff(&worst);
+  if (most < std::max(tolerance, sure * sigma[worst]) ||
+      std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "gyro_unit"; }))
+    return;
+  Eigen::Vector3d factor = Eigen::Vector3d::Ones();
+  factor[worst] += change[worst];
+  gyro_axes_ = (factor.asDiagonal() * gyro_axes_).eval();
+  gyro_bias_ = factor.cwiseProduct(gyro_bias_);
+  find({Sensor::imu,
+        "gyro_unit",
+        fmt::format("the gyro measures {:.3f} times the turning about its {}", 1 / factor[worst], "xyz"[worst]),
+        fmt::format("turning by the LiDAR's sweeps through that of the gyro: {:.3f}, standard deviation {:.3f}", factor[worst],
+                    sigma[worst]),
+        "imu.gyro_scale, or the scale of the driver",
+        1 / factor[worst],
+        "",
+        {{"imu.gyro_scale", vector_text(original_.imu.gyro_scale.cwiseProduct(factor))}},
+        true});
+}
+
+// Noise alone changes each sample of a gyro.
+void Examination::examine_frozen_gyro() {
+  std::string axes;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const auto of_axis = [axis](const InertialSample& s) { return s.gyro[axis]; };
+    const auto [least, most] = std::ranges::minmax(recorded_.imu, {}, of_axis);
+    if (of_axis(least) == of_axis(most)) axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[axis]);
+  }
+  const auto [least, most] = std::ranges::minmax(recorded_.imu, {}, [](const InertialSample& s) { return s.accel.norm(); });
+  constexpr double moves = 1;  // m/s^2
+  if (axes.empty() || most.accel.norm() - least.accel.norm() < moves) return;
+  find({Sensor::imu,
+        "gyro_frozen",
+        fmt::format("the gyro never changes about {}", axes),
+        fmt::format("{} samples are the same, while the acceleration changes by {:.1f} m/s^2", recorded_.imu.size(),
+                    most.accel.norm() - least.accel.norm()),
+        "the driver must publish what the gyro measures",
+        0,
+        "",
+        {},
+        true});
 }
 
 }  // namespace kilvo::lab

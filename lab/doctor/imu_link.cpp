@@ -79,6 +79,9 @@ std::string Examination::link_at_height(double height) const {
     const auto same = [&](std::size_t i) {
       const FootPose &a = here[i].foot[0], &b = there[i].foot[0];
       const double moved = up.dot(b.p[0] - a.p[0]);
+      // Nobody takes a hand for the trunk.
+      constexpr double beside = 0.05;  // m
+      if ((b.p[0] - a.p[0] - moved * up).norm() > beside) return false;
       // Feet that lie higher in the link's frame let the LiDAR stand lower.
       return (b.R_IF.inverse() * a.R_IF).Log().norm() < 0.02 && std::abs(height - moved) < link_height_tolerance;
     };

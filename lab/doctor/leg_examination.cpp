@@ -206,9 +206,9 @@ void Examination::examine_legs() {
     legs_ = agreement(leg_turns_, robot_.imu.T_link_imu.R.inverse(), least_explained);
   }
   if (!legs_.known && !feet_stand()) {
-    // The legs of another robot: the LiDAR and the gyro agree, the legs turn, and under no hypothesis as they do.
-    const std::string detail =
-        fmt::format("{:.0f} % of the legs' turning is that of the gyro at best: no walk, or slow or rough encoders", 100 * legs_.explained);
+    const std::string turning = fmt::format("{:.0f} % of the legs' turning is that of the gyro at best", 100 * legs_.explained);
+    if (way_contradicts_legs(turning)) return;
+    const std::string detail = turning + ": no walk, or slow or rough encoders";
     check(Sensor::legs, "mount of the IMU, joints, clock", Check::Verdict::unknown, detail);
     return;
   }
@@ -221,6 +221,19 @@ void Examination::examine_legs() {
     examine_leg_rotation();
   }
   examine_leg_lengths();
+}
+
+// No change that was tried makes sense of them, and the other sensors agree.
+void Examination::accuse_leg_joints(const std::string& evidence) {
+  find({Sensor::legs,
+        "leg_joints",
+        "the joints of the legs do not move as the robot does, under none of the changes that were tried",
+        evidence,
+        "robot.urdf: axes, origins and zeros of the joints of the legs, or the URDF of this robot; their names and order in the driver",
+        0,
+        "",
+        {},
+        true});
 }
 
 bool Examination::legs_turned() const {
@@ -252,8 +265,8 @@ bool Examination::try_leg_hypotheses() {
   LegScore score;
   std::vector<LegHypothesis> all = leg_hypotheses(recorded_legs_, robot_);
   // Among so many one fits a little by chance: it has to explain nearly all.
-  constexpr double senseless = 0.3, makes_sense = 0.75;  // cost, share
-  constexpr double clearly = 0.85;                       // of the cost that a change of more parts may leave
+  constexpr double senseless = 0.15, makes_sense = 0.75;  // cost, share
+  constexpr double clearly = 0.85;                        // of the cost that a change of more parts may leave
   const std::size_t plain = all.size();
   if (cost > senseless) {
     for (LegHypothesis& h : gross_leg_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));

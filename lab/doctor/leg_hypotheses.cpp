@@ -38,12 +38,14 @@ std::string scaled(const std::string& urdf, double factor) {
   return out.append(from, urdf.cend());
 }
 
-// Two neighbours exchanged in each leg.
-std::vector<LegHypothesis> exchanges(const LegSides& sides) {
+// Two joints of each leg exchanged: neighbours, or all others.
+std::vector<LegHypothesis> exchanges(const LegSides& sides, bool neighbours) {
   std::vector<LegHypothesis> out;
   const std::vector<std::string> joints = sides.joints_of(0);
-  for (std::size_t k = 0; k + 1 < joints.size(); ++k) {
-    const std::string &a = joints[k], &b = joints[k + 1];
+  for (std::size_t pair = 0; pair < joints.size() * joints.size(); ++pair) {
+    const std::size_t k = pair / joints.size(), l = pair % joints.size();
+    if (l <= k || (l == k + 1) != neighbours) continue;
+    const std::string &a = joints[k], &b = joints[l];
     const std::string other_a = sides.other_joint(a), other_b = sides.other_joint(b);
     LegHypothesis h;
     h.cause = "joints_exchanged";
@@ -117,6 +119,7 @@ std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot&
   out.push_back(all);
   const LegSides sides = legs.sides(robot);
   for (LegHypothesis& h : sign_hypotheses(joints, names, sides)) out.push_back(std::move(h));
+  for (LegHypothesis& h : exchanges(sides, false)) out.push_back(std::move(h));
   for (std::size_t k = 0; k < joints.size(); ++k) {
     const std::size_t i = joints[k];
     // A joint that both legs hang on turns them as the IMU's mount does.
@@ -133,7 +136,7 @@ std::vector<LegHypothesis> gross_leg_hypotheses(RecordedLegs& legs, const Robot&
     }
     for (std::size_t l = k + 1; l < joints.size(); ++l) {
       const std::string a = names[i], b = names[joints[l]];
-      if (sides.leg_of_joint(a) != sides.leg_of_joint(b)) continue;
+      if (sides.leg_of_joint(a) != sides.leg_of_joint(b) && sides.other_joint(a) != b) continue;
       LegHypothesis h;
       h.cause = "joints_exchanged";
       h.name = fmt::format("the joints {} and {} are exchanged in the messages", a, b);
@@ -198,7 +201,7 @@ std::vector<LegHypothesis> leg_hypotheses(RecordedLegs& legs, const Robot& robot
     out.push_back(shifted(joints, by));
     if (joints.size() != every.size()) out.push_back(shifted(every, by));
   }
-  for (LegHypothesis& h : exchanges(sides)) out.push_back(std::move(h));
+  for (LegHypothesis& h : exchanges(sides, true)) out.push_back(std::move(h));
   for (const std::string& link : link_names(robot.urdf)) {
     if (link == robot.imu.link || sides.leg_of_link(link)) continue;
     LegHypothesis h;

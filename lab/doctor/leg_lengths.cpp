@@ -171,6 +171,21 @@ Examination::LegWay Examination::measure_leg_way(const LegHypothesis* hypothesis
   return out;
 }
 
+// Soles that slip by a third of the way are no support.
+bool Examination::is_no_way_of_legs(double scale, double sigma) {
+  constexpr double most_slip = 0.3;
+  return std::abs(scale - 1) > std::max(most_slip, sure * sigma);
+}
+
+// Legs that turn as the robot does under no change that was tried are wrong where their way is not the LiDAR's: rough encoders walk as far.
+bool Examination::way_contradicts_legs(const std::string& evidence) {
+  if (!translation_ || way_.empty() || translation_->g_W.norm() < 5) return false;
+  const LegWay way = measure_leg_way(nullptr);
+  if (!std::isfinite(way.sigma) || !is_no_way_of_legs(way.scale, way.sigma)) return false;
+  accuse_leg_joints(fmt::format("{}; {}", evidence, detail_of(way.scale, way.sigma, way.windows, way.height)));
+  return true;
+}
+
 // Legs of the same axes left and right turn the same when their joints are exchanged; only the way differs.
 bool Examination::accuse_exchanged_legs(double scale, const std::string& evidence) {
   for (const LegHypothesis& h : leg_hypotheses(recorded_legs_, robot_)) {
@@ -220,6 +235,10 @@ void Examination::examine_leg_lengths() {
   if (scale_wrong && accuse_exchanged_legs(scale, detail_of(scale, sigma, windows, height))) return;
   // The way of a robot that runs, slips or rolls over its soles is not that of its legs, but it stands as high as described.
   const bool slips = scale_wrong && (!explains(scale) || (height && std::abs(*height - expected(scale)) > std::abs(*height)));
+  if (slips && is_no_way_of_legs(scale, sigma)) {
+    accuse_leg_joints(detail_of(scale, sigma, windows, height));
+    return;
+  }
   if (slips) {
     scale = 1;
     scale_wrong = false;

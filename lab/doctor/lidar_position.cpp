@@ -8,7 +8,7 @@
 namespace kilvo::lab {
 namespace {
 
-constexpr double position_tolerance = 0.05;  // m
+constexpr double position_tolerance = 0.02, worth_waiting = 0.05;  // m
 // Standard deviations: that are of the scatter alone, and a right place was 4 of them off on 14 s of soft ground, 6 on a walk to and fro
 // with a rough IMU.
 constexpr double sure_of_position = 8;
@@ -43,7 +43,7 @@ void Examination::examine_lidar_position() {
       fmt::format("measured ({:.3f}, {:.3f}, {:.3f}) m, standard deviations ({:.3f}, {:.3f}, {:.3f}), described ({:.3f}, {:.3f}, {:.3f})",
                   fit.r.x(), fit.r.y(), fit.r.z(), sigma.x(), sigma.y(), sigma.z(), described.x(), described.y(), described.z());
   if (!wrong) {
-    seems_wrong(Sensor::lidar) |= error.cwiseAbs().maxCoeff() > position_tolerance;
+    seems_wrong(Sensor::lidar) |= error.cwiseAbs().maxCoeff() > worth_waiting;
     check(Sensor::lidar, "position of the mount", sigma.maxCoeff() > 0.05 ? Check::Verdict::unknown : Check::Verdict::good, detail);
     return;
   }
