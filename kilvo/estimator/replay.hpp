@@ -62,8 +62,9 @@ class Replay {
   /// these shares of the IMU's error in rotation and in position until then.
   void correlate_with_sweep(Time end, double rotation, double position) { sweep_noise_ = {end, rotation, position}; }
 
-  /// A sweep changed the velocity by so much, squared, per variance of what it was to change it by.
-  void learn_aliased_share(double normalised);
+  /// A sweep changed the velocity by so much, squared, per variance of what it was to change it by. The noise that is learnt counts where
+  /// the accelerometer aliases, or where sweeps leave a direction `open`: what they measure they tell of themselves.
+  void learn_accel_noise(double normalised, bool open = false);
 
   /// The robot stood still until `end`, if it did, and the first biases are the means of the IMU's samples until then.
   void began_at_rest(std::optional<Time> end) { rest_until_ = end; }
@@ -93,7 +94,6 @@ class Replay {
 
  private:
   static constexpr std::size_t most_remembered = 100, most_taken = 12;
-  static constexpr double least_aliased_share = 0.4;
   // How a step was taken since the last close.
   struct Taken {
     Time t{};
@@ -109,6 +109,9 @@ class Replay {
   FootOrientations standing_at(Time t) const;
   double longest_gap() const;  // between IMU samples, s
   ProcessNoise noise_now() const;
+  double expected_density2() const;  // of the accelerometer's second differences, by the settings
+  bool aliases() const { return usual_.accel_density2 > 1.5 * expected_density2(); }
+  bool uses_learnt_noise() const { return usual_.open || aliases(); }
 
   struct SweepNoiseCorrelation {
     Time until{};
@@ -129,7 +132,8 @@ class Replay {
     Eigen::Vector3d gyro_variance = Eigen::Vector3d::Zero(), accel_variance = Eigen::Vector3d::Zero();
     double gyro_density2 = 0, accel_density2 = 0;  // of the noise that second differences show, if it were white: (rad/s)^2 s, (m/s^2)^2 s
     double gyro_bend2 = 0, accel_bend2 = 0;        // how far a sample lay beside the line between its neighbours at the most, squared
-    double aliased_share = least_aliased_share;  // of the accelerometer's deviation that is more than expected, what stays in its integral
+    double accel_scale = 1;                        // of the accelerometer's noise, as sweeps show it
+    bool open = false;                             // see learn_accel_noise()
   };
   void note_usual(const ImuSample& s);
 

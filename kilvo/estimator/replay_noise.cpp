@@ -40,27 +40,32 @@ void Replay::note_usual(const ImuSample& s) {
 
 double Replay::longest_gap() const { return std::max(config_.max_imu_gap, periods_of_a_gap * usual_.period); }
 
+double Replay::expected_density2() const {
+  const ProcessNoise& noise = config_.noise;
+  return noise.accel * noise.accel + 2 * noise.velocity * noise.velocity / (usual_.period * usual_.period);
+}
+
 // Motion faster than half of the IMU's rate is aliased. Where the noise exceeds the settings, a share of the excess stays in the
 // integral, and where it is more than half a second of samples shows by chance, a part of that each second in a bias: samples that are in
 // step with the robot's steps add up.
 ProcessNoise Replay::noise_now() const {
   ProcessNoise noise = config_.noise;
-  constexpr double gyro_share = 0.1;
-  const double expected = noise.accel * noise.accel + 2 * noise.velocity * noise.velocity / (usual_.period * usual_.period);
-  const double aliased = std::sqrt(std::max(0.0, usual_.accel_density2 - expected));
-  noise.accel = std::hypot(noise.accel, usual_.aliased_share * aliased);
-  if (usual_.accel_density2 > 1.5 * expected)
-    noise.accel_bias = std::hypot(noise.accel_bias, least_aliased_share * least_aliased_share * aliased);
+  constexpr double gyro_share = 0.1, least_aliased_share = 0.4;
+  const double aliased = std::sqrt(std::max(0.0, usual_.accel_density2 - expected_density2()));
+  noise.accel = std::hypot(noise.accel, least_aliased_share * aliased);
+  if (uses_learnt_noise()) noise.accel *= usual_.accel_scale;
+  if (aliases()) noise.accel_bias = std::hypot(noise.accel_bias, least_aliased_share * least_aliased_share * aliased);
   noise.gyro = std::max(noise.gyro, gyro_share * std::sqrt(usual_.gyro_density2));
   return noise;
 }
 
 // R. K. Mehra, "On the identification of variances and adaptive Kalman filtering", 1970. The next samples take back impacts, but not
-// vibration near a multiple of the rate.
-void Replay::learn_aliased_share(double normalised) {
-  constexpr double sweeps = 5;
-  const double next = usual_.aliased_share * std::sqrt(1 + (std::min(normalised, sweeps) - 1) / sweeps);
-  usual_.aliased_share = std::clamp(next, least_aliased_share, 1 / least_aliased_share);
+// vibration near a multiple of the rate, nor what an accelerometer misses that clips.
+void Replay::learn_accel_noise(double normalised, bool open) {
+  constexpr double sweeps = 5, largest_scale = 6;
+  const double scale = usual_.accel_scale, shown = std::min(normalised, sweeps) / (uses_learnt_noise() ? 1 : scale * scale);
+  usual_.accel_scale = std::clamp(scale * std::sqrt(1 + (shown - 1) / sweeps), 1.0, largest_scale);
+  usual_.open = open;
 }
 
 }  // namespace kilvo

@@ -145,15 +145,15 @@ TEST(Replay, SweepsThatChangeTheVelocityByMoreThanItsSigmaShowHowMuchOfTheAliase
     return e.P(at::v, at::v) - before;
   };
   const double least = added();
-  for (int sweep = 0; sweep < 100; ++sweep) replay.learn_aliased_share(1.0);
+  for (int sweep = 0; sweep < 100; ++sweep) replay.learn_accel_noise(1.0);
   EXPECT_EQ(added(), least) << "they are what the covariance says";
-  for (int sweep = 0; sweep < 10; ++sweep) replay.learn_aliased_share(2.0);
+  for (int sweep = 0; sweep < 10; ++sweep) replay.learn_accel_noise(2.0);
   const double more = added();
   EXPECT_GT(more, 4 * least);
-  for (int sweep = 0; sweep < 100; ++sweep) replay.learn_aliased_share(1e6);
+  for (int sweep = 0; sweep < 100; ++sweep) replay.learn_accel_noise(1e6);
   EXPECT_GT(added(), more);
   EXPECT_LT(added(), 40 * least) << "no sweep that fits nowhere makes the prediction worthless";
-  for (int sweep = 0; sweep < 100; ++sweep) replay.learn_aliased_share(0.5);
+  for (int sweep = 0; sweep < 100; ++sweep) replay.learn_accel_noise(0.5);
   EXPECT_EQ(added(), least);
 }
 

@@ -79,7 +79,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
     history_.correct_trajectory(sweep.posterior, sweep.posterior.x.v - prior.x.v);
     lidar_.accept(sweep);
     findings_.note_unmeasured(situation(), alone ? direction_of(lidar_.unobservable()) : std::nullopt);
-    if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior, alone);
+    if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior, alone, lidar_.is_blind_somewhere());
     if (first) map_.begin_at(T_WI, legs_.description_error(sweep.posterior.x));
     if (first && moving_start_) map_.begin_at(T_WI, moving_start_->error_at(T_WI));
     map_.learn(sweep, lidar_.unobservable(), first || lidar_.may_learn(prior, sweep, map_.error_at(prior.x.pose())));
