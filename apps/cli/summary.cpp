@@ -100,12 +100,8 @@ Json recovery_json(const Statistics& statistics, std::uint64_t live_steps) {
 
 Json points_json(const RunFacts& facts, const lab::RecordingSource& source, const Statistics& statistics) {
   const PointDrops& drops = statistics.points;
-  Json out{{"non_finite", drops.non_finite},
-           {"at_origin", drops.at_origin},
-           {"too_near", drops.too_near},
-           {"too_far", drops.too_far},
-           {"own_body", drops.own_body},
-           {"outside_trajectory", drops.outside_trajectory}};
+  Json out{{"non_finite", drops.non_finite}, {"at_origin", drops.at_origin}, {"too_near", drops.too_near},
+           {"too_far", drops.too_far},       {"own_body", drops.own_body},   {"outside_trajectory", drops.outside_trajectory}};
   out["absurd_time"] = source.counts(Sensor::lidar).absurd_point_times;
   out["in_map"] = facts.map_points;
   return out;
