@@ -102,6 +102,7 @@ class Examination {
   bool lidar_is_nearer(const Eigen::Vector3d& p, const Eigen::Vector3d& other, const SO3& R_IL) const;
   void examine_lidar_clock(const MountFit& fit);
   void examine_lidar_position();
+  void examine_lidar_range();
   bool examine_lidar_scale();
   void accuse_lidar_scale(double factor, const std::string& evidence);
   // leg_examination.cpp
@@ -110,6 +111,7 @@ class Examination {
   double independent_turns() const { return 3 * stepping_.seconds() / 0.25; }
   bool examine_leg_names();
   bool examine_joint_values();
+  void examine_locked_joints();
   /// Legs that hardly turn show how they bend, not how they are mounted.
   bool legs_turned() const;
   bool feet_stand() const;

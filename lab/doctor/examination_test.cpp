@@ -263,6 +263,21 @@ TEST(Doctor, LegsThatMakeNoSenseUnderAnyChangeAreNamed) {
   EXPECT_THAT(causes(walked().recorded, robot), ElementsAre("leg_joints"));
 }
 
+TEST(Doctor, AJointThatIsLockedAndTurnsIsNamed) {
+  Robot robot = walked().robot;
+  robot.locked_joints.push_back("left_knee_joint");
+  const Diagnosis diagnosis = Examination(walked().recorded, robot).run();
+  ASSERT_EQ(diagnosis.findings.size(), 1U);
+  EXPECT_EQ(diagnosis.findings[0].cause, "joint_locked");
+  EXPECT_GT(diagnosis.findings[0].size, 0.3);
+}
+
+TEST(Doctor, LimitsOfTheRangeInAnotherUnitAreNamed) {
+  Robot robot = walked().robot;
+  robot.lidar.min_range = 30;
+  EXPECT_THAT(causes(walked().recorded, robot), ElementsAre("lidar_range"));
+}
+
 TEST(Doctor, ALidarAFewCentimetresAsideIsNamedAndNotTheImu) {
   Robot robot = walked().robot;
   robot.lidar.T_imu_lidar.p += Eigen::Vector3d(0.03, 0, 0);

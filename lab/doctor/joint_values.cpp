@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
+#include <fmt/format.h>
 
 #include "lab/doctor/examination.hpp"
 #include "lab/doctor/leg_hypotheses.hpp"
@@ -35,8 +36,38 @@ bool same_values(const std::vector<LegSample>& legs, std::size_t a, std::size_t 
 
 }  // namespace
 
+// A joint that is described as locked, and turns.
+void Examination::examine_locked_joints() {
+  const std::vector<Range> ranges = ranges_of(recorded_.legs, recorded_.joint_names.size());
+  std::string moved;
+  std::vector<std::string> kept;
+  double most = 0;
+  for (const std::string& joint : robot_.locked_joints) {
+    const auto i = static_cast<std::size_t>(std::ranges::find(recorded_.joint_names, joint) - recorded_.joint_names.begin());
+    if (i == ranges.size() || !(ranges[i].size() > turns)) {
+      kept.push_back(joint);
+      continue;
+    }
+    moved += (moved.empty() ? "" : ", ") + joint;
+    most = std::max(most, ranges[i].size());
+  }
+  if (moved.empty()) return;
+  robot_.locked_joints = kept;
+  const std::string list = fmt::format("[{}]", fmt::join(kept, ", "));
+  find({Sensor::legs,
+        "joint_locked",
+        fmt::format("described as locked, and they turn: {}", moved),
+        fmt::format("by up to {:.2f} rad in the messages", most),
+        "robot.locked_joints: " + list,
+        most,
+        "rad",
+        {{"robot.locked_joints", list}},
+        true});
+}
+
 // False when the legs cannot be judged with these values.
 bool Examination::examine_joint_values() {
+  examine_locked_joints();
   const std::vector<std::size_t> joints = recorded_legs_.joints_that_matter(robot_);
   const std::vector<Range> ranges = ranges_of(recorded_.legs, recorded_.joint_names.size());
   const std::vector<std::string>& names = recorded_.joint_names;

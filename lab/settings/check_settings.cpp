@@ -106,6 +106,9 @@ void check_names(const Settings& s, Problems& problems) {
     }
   };
   for (const Foot& foot : s.robot.feet) check("robot.feet", foot.link, names.links, "link");
+  const auto& feet = s.robot.feet;
+  if (!feet[0].link.empty() && feet[0].link == feet[1].link)
+    problems.collect([&] { refuse(s, "robot.feet", fmt::format("both feet are on link {}", feet[0].link)); });
   check("imu.T_link_imu.link", s.robot.imu.link, names.links, "link");
   check("legs.gyro_link", s.leg_clock.gyro_link, names.links, "link");
   for (const std::string& joint : s.robot.locked_joints) check("robot.locked_joints", joint, names.joints, "joint");

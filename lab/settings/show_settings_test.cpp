@@ -151,6 +151,8 @@ TEST_F(UrdfInSettings, LinksAndJointsMustExist) {
   EXPECT_THAT(error_of("robot: {urdf: robot.urdf, locked_joints: [waist, wrist]}"), HasSubstr("no joint 'wrist', nearest is 'waist'"));
   EXPECT_THAT(error_of("robot: {urdf: robot.urdf, feet: [{name: left, link: foot_l}, {name: right, link: foot_x}]}"),
               HasSubstr("no link 'foot_x'"));
+  EXPECT_THAT(error_of("robot: {urdf: robot.urdf, feet: [{name: left, link: foot_l}, {name: right, link: foot_l}]}"),
+              HasSubstr("both feet are on link foot_l"));
 }
 
 TEST_F(UrdfInSettings, AChainWithoutEndIsRefused) {
