@@ -71,6 +71,10 @@ def leg_cases(config, folder, work):
     for joint in ("left_hip_pitch", "right_hip_yaw", "left_ankle_pitch", "right_ankle_roll", "right_knee"):
         urdf(f"sign of {joint}", flipped_axis(text, joint + "_joint"), ["joint_sign"])
     urdf("signs of both hip rolls", flipped_axis(flipped_axis(text, "left_hip_roll_joint"), "right_hip_roll_joint"), ["joint_sign"])
+    for a, b in (("left_knee", "right_knee"), ("left_hip_yaw", "right_hip_yaw"), ("left_ankle_pitch", "right_ankle_pitch"), ("left_hip_pitch", "left_knee")):
+        one, other = f'<joint name="{a}_joint"', f'<joint name="{b}_joint"'
+        urdf(f"{a} and {b} exchanged", text.replace(one, "<joint name=@").replace(other, one).replace("<joint name=@", other), ["joints_exchanged", "leg_joints"])
+    urdf("knees that bend to the side", re.sub(r'(<joint name="(?:left|right)_knee_joint".*?<axis xyz=")[^"]+', r"\g<1>1 0 0", text, flags=re.S), ["leg_joints"])
     urdf("thigh 10 % longer", scaled_urdf(scaled_urdf(text, "left_hip_yaw_link", 1.1), "right_hip_yaw_link", 1.1), ["leg_lengths"])
     urdf("one shin 10 % longer", scaled_urdf(text, "left_knee_link", 1.1), ["leg_lengths"])
     urdf("legs 10 % shorter", scaled_urdf(scaled_urdf(scaled_urdf(scaled_urdf(
@@ -123,6 +127,10 @@ def mount_cases(config):
         out.append(("camera's size halved", [f"camera.width={c['width'] // 2}", f"camera.height={c['height'] // 2}"], ["camera_size"]))
         out.append(("camera of half the size", [f"camera.{k}={c[k] / 2:g}" for k in ("fx", "fy", "cx", "cy")], ["camera_focal", "camera_principal_point"]))
         out.append(("camera's fx 10 % longer", [f"camera.fx={1.1 * c['fx']}", f"camera.fy={1.1 * c['fy']}"], ["camera_focal"]))
+        out.append(("camera's fy alone 10 % shorter", [f"camera.fy={0.9 * c['fy']}"], ["camera_lens", "camera_focal"]))
+        out.append(("camera's fx alone a third longer", [f"camera.fx={1.33 * c['fx']}"], ["camera_lens", "camera_focal"]))
+        if any(c.get("distortion", [])):
+            out.append(("camera's distortion of the other sign", [f"camera.distortion={[-k for k in c['distortion']]}"], ["camera_lens"]))
         out.append(("camera's fx and fy 1.5 times", [f"camera.fx={1.5 * c['fx']}", f"camera.fy={1.5 * c['fy']}"], ["camera_focal"]))
         for ms in (-50, 100):
             out.append((f"camera's clock {ms} ms", [f"camera.time_offset={ms / 1000}"], ["camera_clock"]))
@@ -143,6 +151,9 @@ def description_cases(config, folder, work):
         out.append(("LiDAR yawed by 180", texts(key, R @ rotation("z", 180)), ["lidar_rotation"]))
         out.append(("LiDAR moved by 10 cm", texts(key, p=p + [0.1, 0, 0]), ["lidar_position"]))
         out.append(("LiDAR moved by 10 cm up", texts(key, p=p + [0, 0, -0.1]), ["lidar_position"]))
+        out.append(("LiDAR moved by 3 cm", texts(key, p=p + [0.03, 0, 0]), ["lidar_position"]))
+        out.append(("LiDAR's position left out", texts(key, p=0 * p), ["lidar_position"]))
+        out.append(("LiDAR's least range in cm", ["lidar.min_range=30"], ["lidar_range"]))
         out.append(("LiDAR position in mm", texts(key, p=1000 * p), ["lidar_position", "lidar_unit"]))
         for ms in (5, -20, 100, 1000):
             out.append((f"LiDAR clock {ms} ms", [f"lidar.time_offset={ms / 1000}"], ["lidar_clock"]))

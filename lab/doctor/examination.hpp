@@ -169,6 +169,7 @@ class Examination {
   void examine_camera_fit(const CameraTracks& tracks);
   void accuse_camera_rotation(const SO3& R_IC, const std::string& evidence);
   bool examine_camera_position(const CameraTracks& tracks, const CameraFit& fit, const CameraFit& placed);
+  bool accuse_lens(const CameraTracks& tracks, const CameraFit& fit, bool surely);
   bool accuse_principal_point(const CameraTracks& tracks, const CameraFit& fit, double other);
 
   GyroPath gyro() const { return {recorded_.imu, gyro_axes_, gyro_bias_}; }
