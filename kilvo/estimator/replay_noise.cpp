@@ -63,7 +63,7 @@ ProcessNoise Replay::noise_now() const {
 // vibration near a multiple of the rate, nor what an accelerometer misses that clips.
 void Replay::learn_accel_noise(double normalised, bool open) {
   constexpr double sweeps = 5, largest_scale = 6;
-  const double scale = usual_.accel_scale, shown = std::min(normalised, sweeps) / (uses_learnt_noise() ? 1 : scale * scale);
+  const double scale = usual_.accel_scale, shown = std::min(normalised / (uses_learnt_noise() ? 1 : scale * scale), sweeps);
   usual_.accel_scale = std::clamp(scale * std::sqrt(1 + (shown - 1) / sweeps), 1.0, largest_scale);
   usual_.open = open;
 }

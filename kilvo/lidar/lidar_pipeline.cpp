@@ -84,8 +84,8 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
   Registration out;
   out.posterior = prior;
   out.considered = context.considered;
+  own_body_.begin_sweep();
   out.points = undistort(scan, context.trajectory, prior.t, mount_, drops, &own_body_);
-  own_body_.learn(prior.x.pose());
   if (out.points.empty()) {
     out.refused = Reason::no_usable_point;
     return out;
@@ -165,6 +165,7 @@ void LidarPipeline::search(const VoxelMap& map, const Estimate& prior, LidarMode
 
 void LidarPipeline::accept(const Registration& sweep) {
   if (sweep.carries) {
+    own_body_.learn(sweep.posterior.x.pose());
     blind_.see(sweep.report.information, sweep.report.degeneracy);
   } else {
     blind_.see_nothing();

@@ -8,7 +8,7 @@
 namespace kilvo {
 namespace {
 
-// Of what stands in the world, a wall along the way alone stays in a cell for longer.
+// Of what stands in the world, a wall along the way and a floor that is as near stay in a cell for longer.
 constexpr float share_of_body = 0.3F;
 constexpr int fewest_sweeps = 10, remembered_sweeps = 30;
 // As far as a cell is wide; from the cells' edge the same angle.
@@ -44,12 +44,14 @@ bool OwnBody::meets(const LidarPoint& p) {
 }
 
 void OwnBody::learn(const SE3& T_WI) {
-  const auto moved = [&] {
-    const SE3 T = last_->inverse() * T_WI;
+  // From both: a robot that sways is at two places in turn.
+  const auto is_elsewhere = [&T_WI](const std::optional<SE3>& before) {
+    if (!before) return true;
+    const SE3 T = before->inverse() * T_WI;
     return T.p.norm() > other_place || T.R.Log().norm() > other_angle;
   };
-  if (!last_ || moved()) {
-    last_ = T_WI;
+  if (std::ranges::all_of(last_, is_elsewhere)) {
+    last_ = {T_WI, last_[0]};
     sweeps_ = std::min(sweeps_ + 1, remembered_sweeps);
     for (std::size_t i = 0; i < share_.size(); ++i) share_[i] += (static_cast<float>(hit_[i]) - share_[i]) / static_cast<float>(sweeps_);
     std::ranges::fill(body_, 0);
@@ -62,7 +64,8 @@ void OwnBody::learn(const SE3& T_WI) {
       }
     }
   }
-  std::ranges::fill(hit_, 0);
 }
+
+void OwnBody::begin_sweep() { std::ranges::fill(hit_, 0); }
 
 }  // namespace kilvo

@@ -2,6 +2,7 @@
 // it stands still, and where nothing else is measured (along a corridor) they would be believed.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -21,10 +22,10 @@ class OwnBody {
   /// Farther than that from the LiDAR there is none of it, m.
   float reach() const { return reach_; }
 
-  /// Whether a point, not farther than reach(), is of the robot. What was asked for belongs to the current sweep.
+  void begin_sweep();
+  /// Whether a point of the sweep, not farther than reach(), is of the robot.
   bool meets(const LidarPoint& p);
-
-  /// The sweep is over; it was taken at this pose T_WI.
+  /// The sweep was registered at this pose T_WI.
   void learn(const SE3& T_WI);
 
  private:
@@ -36,7 +37,7 @@ class OwnBody {
   std::vector<double> boxes_;
   float reach_ = learnt_reach;
   int sweeps_ = 0;                                                                  // that were learnt from
-  std::optional<SE3> last_;                                                         // where the last of them was
+  std::array<std::optional<SE3>, 2> last_;                                          // where the last two of them were
   std::vector<std::uint8_t> hit_ = std::vector<std::uint8_t>(side * side * side);   // by the current sweep
   std::vector<float> share_ = std::vector<float>(side * side * side);               // of the sweeps lately that hit a cell
   std::vector<std::uint8_t> body_ = std::vector<std::uint8_t>(side * side * side);  // and its neighbours

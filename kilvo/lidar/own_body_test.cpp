@@ -20,6 +20,7 @@ class Walk {
   void forward(double length, double step, bool wall = false) {
     for (double way = 0; way < length; way += step) {
       x_ += step;
+      body_.begin_sweep();
       std::normal_distribution<double> swing(0, 0.02);
       for (const double side : {-1.0, 1.0})
         for (int i = 0; i < 20; ++i) see({0.35 + 0.01 * i + swing(random_), side * 0.3 + swing(random_), -0.25 + swing(random_)}, is_arm_);
@@ -65,6 +66,15 @@ TEST(OwnBody, OfARobotThatStandsNothingIsLearnt) {
   Walk walk(body);
   walk.forward(0.09, 0.0003);
   EXPECT_EQ(walk.arms(), 0);
+}
+
+TEST(OwnBody, NorOfOneThatSways) {
+  OwnBody body;
+  for (int k = 0; k < 100; ++k) {
+    body.begin_sweep();
+    EXPECT_FALSE(body.meets(point_at({0.5, 0, 0.1})));
+    body.learn({SO3(), {0, k % 2 == 0 ? 0.06 : -0.06, 0}});
+  }
 }
 
 TEST(OwnBody, AWallBesideTheWayIsForgottenWhereItEnds) {

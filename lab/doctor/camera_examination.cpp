@@ -104,7 +104,9 @@ bool Examination::examine_camera_position(const CameraTracks& tracks, const Came
   if (is_turned(fit) && accuse_principal_point(tracks, fit, placed.error)) return true;
   // The right place brings the corners to their lines (from 0.11 to 0.08 px for 6 cm aside; along the view they hardly tell).
   constexpr double explains = 0.85, farthest = 0.3;  // -, m
-  if (placed.error > explains * fit.error && accuse_lens(tracks, fit, error.norm() > farthest)) return true;
+  const Eigen::Vector3d view = robot_.camera.T_imu_camera.R * Eigen::Vector3d::UnitZ();
+  const double across = (error - view.dot(error) * view).norm();
+  if (placed.error > explains * fit.error && accuse_lens(tracks, fit, across > farthest)) return true;
   Eigen::Vector3d right = described;
   for (int i = 0; i < 3; ++i) {
     if (std::abs(error[i]) > tolerance + sure_of_position * sigma[i]) right[i] = std::round(1e3 * placed.p_IC[i]) / 1e3;

@@ -269,7 +269,7 @@ TEST(Doctor, AJointThatIsLockedAndTurnsIsNamed) {
   const Diagnosis diagnosis = Examination(walked().recorded, robot).run();
   ASSERT_EQ(diagnosis.findings.size(), 1U);
   EXPECT_EQ(diagnosis.findings[0].cause, "joint_locked");
-  EXPECT_GT(diagnosis.findings[0].size, 0.3);
+  EXPECT_GT(diagnosis.findings[0].size, 0.1);
 }
 
 TEST(Doctor, LimitsOfTheRangeInAnotherUnitAreNamed) {

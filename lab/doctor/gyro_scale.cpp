@@ -113,6 +113,7 @@ void Examination::examine_gyro_axes(const Eigen::Vector3d& change, const Eigen::
     return;
   Eigen::Vector3d factor = Eigen::Vector3d::Ones();
   factor[worst] += change[worst];
+  const bool own_axes = gyro_axes_.isApprox(Eigen::Matrix3d::Identity(), 1e-9);  // as imu.gyro_scale has them
   gyro_axes_ = (factor.asDiagonal() * gyro_axes_).eval();
   gyro_bias_ = factor.cwiseProduct(gyro_bias_);
   find({Sensor::imu,
@@ -123,8 +124,9 @@ void Examination::examine_gyro_axes(const Eigen::Vector3d& change, const Eigen::
         "imu.gyro_scale, or the scale of the driver",
         1 / factor[worst],
         "",
-        {{"imu.gyro_scale", vector_text(original_.imu.gyro_scale.cwiseProduct(factor))}},
+        {},
         true});
+  if (own_axes) diagnosis_.findings.back().changes = {{"imu.gyro_scale", vector_text(original_.imu.gyro_scale.cwiseProduct(factor))}};
 }
 
 // Noise alone changes each sample of a gyro.
@@ -135,19 +137,23 @@ void Examination::examine_frozen_gyro() {
     const auto [least, most] = std::ranges::minmax(recorded_.imu, {}, of_axis);
     if (of_axis(least) == of_axis(most)) axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[axis]);
   }
-  const auto [least, most] = std::ranges::minmax(recorded_.imu, {}, [](const InertialSample& s) { return s.accel.norm(); });
-  constexpr double moves = 1;  // m/s^2
-  if (axes.empty() || most.accel.norm() - least.accel.norm() < moves) return;
-  find({Sensor::imu,
-        "gyro_frozen",
-        fmt::format("the gyro never changes about {}", axes),
-        fmt::format("{} samples are the same, while the acceleration changes by {:.1f} m/s^2", recorded_.imu.size(),
-                    most.accel.norm() - least.accel.norm()),
-        "the driver must publish what the gyro measures",
-        0,
-        "",
-        {},
-        true});
+  // A gyro with a dead band may well be silent at rest.
+  double mean = 0, square = 0;
+  const auto count = static_cast<double>(recorded_.imu.size());
+  for (const InertialSample& s : recorded_.imu) mean += s.accel.norm() / count, square += s.accel.squaredNorm() / count;
+  constexpr double walks = 0.5;  // m/s^2, standard deviation
+  const double moved = std::sqrt(std::max(0.0, square - mean * mean));
+  if (axes.empty() || moved < walks) return;
+  find(
+      {Sensor::imu,
+       "gyro_frozen",
+       fmt::format("the gyro never changes about {}", axes),
+       fmt::format("{} samples are the same, while the acceleration has a standard deviation of {:.1f} m/s^2", recorded_.imu.size(), moved),
+       "the driver must publish what the gyro measures",
+       0,
+       "",
+       {},
+       true});
 }
 
 }  // namespace kilvo::lab

@@ -29,6 +29,12 @@ std::vector<Range> ranges_of(const std::vector<LegSample>& legs, std::size_t joi
   return out;
 }
 
+struct RunningMoments {
+  double count = 0, sum = 0, square = 0;
+  void add(double x) { count += 1, sum += x, square += x * x; }
+  double deviation() const { return count > 0 ? std::sqrt(std::max(0.0, square / count - sum * sum / (count * count))) : 0; }
+};
+
 bool same_values(const std::vector<LegSample>& legs, std::size_t a, std::size_t b) {
   return std::ranges::all_of(legs,
                              [&](const LegSample& s) { return s.position.size() <= std::max(a, b) || s.position[a] == s.position[b]; });
@@ -36,20 +42,25 @@ bool same_values(const std::vector<LegSample>& legs, std::size_t a, std::size_t 
 
 }  // namespace
 
-// A joint that is described as locked, and turns.
+// A joint of the legs that is described as locked, and turns.
 void Examination::examine_locked_joints() {
-  const std::vector<Range> ranges = ranges_of(recorded_.legs, recorded_.joint_names.size());
+  Robot unlocked = robot_;
+  unlocked.locked_joints.clear();
+  const std::vector<std::size_t> joints = recorded_legs_.joints_that_matter(unlocked);
   std::string moved;
   std::vector<std::string> kept;
   double most = 0;
   for (const std::string& joint : robot_.locked_joints) {
     const auto i = static_cast<std::size_t>(std::ranges::find(recorded_.joint_names, joint) - recorded_.joint_names.begin());
-    if (i == ranges.size() || !(ranges[i].size() > turns)) {
+    RunningMoments of_joint;
+    for (const LegSample& s : recorded_.legs)
+      if (i < s.position.size()) of_joint.add(s.position[i]);
+    if (std::ranges::find(joints, i) == joints.end() || of_joint.deviation() < 0.5 * turns) {
       kept.push_back(joint);
       continue;
     }
     moved += (moved.empty() ? "" : ", ") + joint;
-    most = std::max(most, ranges[i].size());
+    most = std::max(most, of_joint.deviation());
   }
   if (moved.empty()) return;
   robot_.locked_joints = kept;
@@ -57,7 +68,7 @@ void Examination::examine_locked_joints() {
   find({Sensor::legs,
         "joint_locked",
         fmt::format("described as locked, and they turn: {}", moved),
-        fmt::format("by up to {:.2f} rad in the messages", most),
+        fmt::format("standard deviation of up to {:.2f} rad in the messages", most),
         "robot.locked_joints: " + list,
         most,
         "rad",

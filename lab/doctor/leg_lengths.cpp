@@ -180,8 +180,21 @@ bool Examination::is_no_way_of_legs(double scale, double sigma) {
 // Legs that turn as the robot does under no change that was tried are wrong where their way is not the LiDAR's: rough encoders walk as far.
 bool Examination::way_contradicts_legs(const std::string& evidence) {
   if (!translation_ || way_.empty() || translation_->g_W.norm() < 5) return false;
+  if (seems_wrong(Sensor::legs) || seems_wrong(Sensor::imu)) return false;
   const LegWay way = measure_leg_way(nullptr);
   if (!std::isfinite(way.sigma) || !is_no_way_of_legs(way.scale, way.sigma)) return false;
+  // Nor by a mount that is turned about the vertical.
+  const SO3 described = robot_.imu.T_link_imu.R;
+  const std::vector<SO3> mounts = upright_mounts();
+  constexpr std::size_t every = 4;  // of 36
+  bool none = true;
+  for (std::size_t k = 0; k < mounts.size() && none; k += every) {
+    robot_.imu.T_link_imu.R = mounts[k];
+    const LegWay other = measure_leg_way(nullptr);
+    none = std::isfinite(other.sigma) && is_no_way_of_legs(other.scale, other.sigma);
+  }
+  robot_.imu.T_link_imu.R = described;
+  if (!none) return false;
   accuse_leg_joints(fmt::format("{}; {}", evidence, detail_of(way.scale, way.sigma, way.windows, way.height)));
   return true;
 }
@@ -236,7 +249,8 @@ void Examination::examine_leg_lengths() {
   // The way of a robot that runs, slips or rolls over its soles is not that of its legs, but it stands as high as described.
   const bool slips = scale_wrong && (!explains(scale) || (height && std::abs(*height - expected(scale)) > std::abs(*height)));
   if (slips && is_no_way_of_legs(scale, sigma)) {
-    accuse_leg_joints(detail_of(scale, sigma, windows, height));
+    const std::string way_detail = detail_of(scale, sigma, windows, height);
+    if (!accuse_lidar_instead(1 / scale, way_detail)) accuse_leg_joints(way_detail);
     return;
   }
   if (slips) {

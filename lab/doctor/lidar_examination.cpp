@@ -64,27 +64,30 @@ void Examination::examine_lidar() {
 // Limits of the range that leave hardly a point: of another unit.
 void Examination::examine_lidar_range() {
   const LidarMount& lidar = robot_.lidar;
-  std::size_t all = 0, within = 0;
+  std::size_t all = 0, within = 0, nearer = 0;
   for (const Sweep& sweep : recorded_.sweeps) {
     for (const TimedPoint& p : *sweep.points) {
       const auto range = static_cast<double>(p.p.norm());
       ++all;
       within += range >= lidar.min_range && range <= lidar.max_range ? 1 : 0;
+      nearer += range < lidar.min_range ? 1 : 0;
     }
   }
   constexpr double fewest = 0.1;  // of the points
   const double share = static_cast<double>(within) / static_cast<double>(std::max<std::size_t>(all, 1));
   if (all == 0 || share > fewest) return;
   const LidarMount usual;
+  const Change change =
+      2 * nearer > all ? Change{"lidar.min_range", number_text(usual.min_range)} : Change{"lidar.max_range", number_text(usual.max_range)};
   find({Sensor::lidar,
         "lidar_range",
         fmt::format("{:.0f} % of the LiDAR's points are between lidar.min_range ({:g} m) and lidar.max_range ({:g} m)", 100 * share,
                     lidar.min_range, lidar.max_range),
         fmt::format("{} of {} points", within, all),
-        "lidar.min_range and lidar.max_range, in metres",
+        change.key + ", in metres",
         share,
         "",
-        {{"lidar.min_range", number_text(usual.min_range)}, {"lidar.max_range", number_text(usual.max_range)}},
+        {change},
         true});
 }
 

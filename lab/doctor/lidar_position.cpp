@@ -63,9 +63,11 @@ void Examination::examine_lidar_position() {
     f.text = "the LiDAR's mount is given the wrong way round (the IMU in the LiDAR's frame)";
     right = inverse;
   } else {
-    f.text = fmt::format("the LiDAR is {:.0f} cm from where it is described, ({:.2f}, {:.2f}, {:.2f}) m off", 100 * error.norm(), error.x(),
-                         error.y(), error.z());
+    const Eigen::Vector3d off = right - described;  // of what is known well
+    f.text = fmt::format("the LiDAR is {:.0f} cm from where it is described, ({:.2f}, {:.2f}, {:.2f}) m off", 100 * off.norm(), off.x(),
+                         off.y(), off.z());
   }
+  f.size = (right - described).norm();
   f.remedy = fmt::format("lidar.T_imu_lidar.p: {}", vector_text(right));
   f.changes = {{"lidar.T_imu_lidar.p", vector_text(right)}};
   robot_.lidar.T_imu_lidar.p = right;
