@@ -35,9 +35,8 @@ bool OwnBody::is_in_a_box(const LidarPoint& p) const {
 
 bool OwnBody::meets(const LidarPoint& p) {
   if (is_in_a_box(p)) return true;
-  constexpr float to_cells = side / (2 * learnt_reach);
   if (!(p.x * p.x + p.y * p.y + p.z * p.z < learnt_reach * learnt_reach)) return false;
-  const auto cell = [](float x) { return std::min(side - 1, static_cast<int>((x + learnt_reach) * to_cells)); };
+  const auto cell = [](float x) { return std::min(side - 1, static_cast<int>((x + learnt_reach) * (side / (2 * learnt_reach)))); };
   const auto i = static_cast<std::size_t>((cell(p.z) * side + cell(p.y)) * side + cell(p.x));
   hit_[i] = 1;
   return body_[i] != 0;

@@ -223,19 +223,6 @@ void Examination::examine_legs() {
   examine_leg_lengths();
 }
 
-// No change that was tried makes sense of them, and the other sensors agree.
-void Examination::accuse_leg_joints(const std::string& evidence) {
-  find({Sensor::legs,
-        "leg_joints",
-        "the joints of the legs do not move as the robot does, under none of the changes that were tried",
-        evidence,
-        "robot.urdf: axes, origins and zeros of the joints of the legs, or the URDF of this robot; their names and order in the driver",
-        0,
-        "",
-        {},
-        true});
-}
-
 bool Examination::legs_turned() const {
   constexpr double least_turning = 0.15, least_weakest = 0.04;  // rad/s
   return legs_.turning >= least_turning && legs_.weakest >= least_weakest;

@@ -171,12 +171,6 @@ Examination::LegWay Examination::measure_leg_way(const LegHypothesis* hypothesis
   return out;
 }
 
-// Soles that slip by a third of the way are no support.
-bool Examination::is_no_way_of_legs(double scale, double sigma) {
-  constexpr double most_slip = 0.3;
-  return std::abs(scale - 1) > std::max(most_slip, sure * sigma);
-}
-
 // Legs that turn as the robot does under no change that was tried are wrong where their way is not the LiDAR's: rough encoders walk as far.
 bool Examination::way_contradicts_legs(const std::string& evidence) {
   if (!translation_ || way_.empty() || translation_->g_W.norm() < 5) return false;
@@ -282,16 +276,6 @@ void Examination::examine_leg_lengths() {
     accuse_imu_place(*height);
   }
   diagnosis_.findings.back().evidence = detail;
-}
-
-// Legs that are too short and points that are too far look alike: the acceleration agrees with one of them. A URDF is wrong more often.
-bool Examination::accuse_lidar_instead(double scale, const std::string& evidence) {
-  constexpr double clearly = 2;  // standard deviations
-  const double if_lidar = lidar_scale_.distance_to(scale), if_legs = lidar_scale_.distance_to(1);
-  if (!(if_legs * if_legs - if_lidar * if_lidar > clearly * clearly)) return false;
-  accuse_lidar_scale(scale, fmt::format("{}; way of the sweeps through that of the accelerometer {:.3f}, standard deviation {:.3f}",
-                                        evidence, lidar_scale_.factor, lidar_scale_.sigma));
-  return true;
 }
 
 void Examination::accuse_leg_lengths(double scale, double height) {

@@ -98,4 +98,14 @@ void Examination::accuse_lidar_scale(double factor, const std::string& evidence)
         true});
 }
 
+// Legs that are too short and points that are too far look alike: the acceleration agrees with one of them. A URDF is wrong more often.
+bool Examination::accuse_lidar_instead(double scale, const std::string& evidence) {
+  constexpr double clearly = 2;  // standard deviations
+  const double if_lidar = lidar_scale_.distance_to(scale), if_legs = lidar_scale_.distance_to(1);
+  if (!(if_legs * if_legs - if_lidar * if_lidar > clearly * clearly)) return false;
+  accuse_lidar_scale(scale, fmt::format("{}; way of the sweeps through that of the accelerometer {:.3f}, standard deviation {:.3f}",
+                                        evidence, lidar_scale_.factor, lidar_scale_.sigma));
+  return true;
+}
+
 }  // namespace kilvo::lab
