@@ -3,6 +3,7 @@
 #include <cmath>
 #include <fmt/core.h>
 
+#include "kilvo/math/running_statistics.hpp"
 #include "lab/doctor/examination.hpp"
 
 namespace kilvo::lab {
@@ -138,11 +139,10 @@ void Examination::examine_frozen_gyro() {
     if (of_axis(least) == of_axis(most)) axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[axis]);
   }
   // A gyro with a dead band may well be silent at rest.
-  double mean = 0, square = 0;
-  const auto count = static_cast<double>(recorded_.imu.size());
-  for (const InertialSample& s : recorded_.imu) mean += s.accel.norm() / count, square += s.accel.squaredNorm() / count;
+  RunningStatistics acceleration(0, 0, 0, INFINITY);
+  for (const InertialSample& s : recorded_.imu) acceleration.add(s.accel.norm(), 1);
   constexpr double walks = 0.5;  // m/s^2, standard deviation
-  const double moved = std::sqrt(std::max(0.0, square - mean * mean));
+  const double moved = acceleration.sigma();
   if (axes.empty() || moved < walks) return;
   find(
       {Sensor::imu,

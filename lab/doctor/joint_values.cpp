@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 #include <fmt/format.h>
 
+#include "kilvo/math/running_statistics.hpp"
 #include "lab/doctor/examination.hpp"
 #include "lab/doctor/leg_hypotheses.hpp"
 
@@ -29,12 +30,6 @@ std::vector<Range> ranges_of(const std::vector<LegSample>& legs, std::size_t joi
   return out;
 }
 
-struct RunningMoments {
-  double count = 0, sum = 0, square = 0;
-  void add(double x) { count += 1, sum += x, square += x * x; }
-  double deviation() const { return count > 0 ? std::sqrt(std::max(0.0, square / count - sum * sum / (count * count))) : 0; }
-};
-
 bool same_values(const std::vector<LegSample>& legs, std::size_t a, std::size_t b) {
   return std::ranges::all_of(legs,
                              [&](const LegSample& s) { return s.position.size() <= std::max(a, b) || s.position[a] == s.position[b]; });
@@ -52,15 +47,15 @@ void Examination::examine_locked_joints() {
   double most = 0;
   for (const std::string& joint : robot_.locked_joints) {
     const auto i = static_cast<std::size_t>(std::ranges::find(recorded_.joint_names, joint) - recorded_.joint_names.begin());
-    RunningMoments of_joint;
+    RunningStatistics of_joint(0, 0, 0, INFINITY);
     for (const LegSample& s : recorded_.legs)
-      if (i < s.position.size()) of_joint.add(s.position[i]);
-    if (std::ranges::find(joints, i) == joints.end() || of_joint.deviation() < 0.5 * turns) {
+      if (i < s.position.size()) of_joint.add(s.position[i], 1);
+    if (std::ranges::find(joints, i) == joints.end() || of_joint.sigma() < 0.5 * turns) {
       kept.push_back(joint);
       continue;
     }
     moved += (moved.empty() ? "" : ", ") + joint;
-    most = std::max(most, of_joint.deviation());
+    most = std::max(most, of_joint.sigma());
   }
   if (moved.empty()) return;
   robot_.locked_joints = kept;
@@ -117,25 +112,6 @@ bool Examination::examine_joint_values() {
           true});
   }
   return frozen.empty() && repeated.empty();
-}
-
-// No change that was tried makes sense of them, and the other sensors agree.
-void Examination::accuse_leg_joints(const std::string& evidence) {
-  find({Sensor::legs,
-        "leg_joints",
-        "the joints of the legs do not move as the robot does, under none of the changes that were tried",
-        evidence,
-        "robot.urdf: axes, origins and zeros of the joints of the legs, or the URDF of this robot; their names and order in the driver",
-        0,
-        "",
-        {},
-        true});
-}
-
-// Soles that slip by a third of the way are no support.
-bool Examination::is_no_way_of_legs(double scale, double sigma) {
-  constexpr double most_slip = 0.3;
-  return std::abs(scale - 1) > std::max(most_slip, sure * sigma);
 }
 
 }  // namespace kilvo::lab

@@ -116,4 +116,23 @@ bool Examination::feet_stand() const {
   return fit.good && fit.moved < still && (leg_start_ || (fit.R_link_imu * robot_.imu.T_link_imu.R.inverse()).Log().norm() < near);
 }
 
+// No change that was tried makes sense of them, and the other sensors agree.
+void Examination::accuse_leg_joints(const std::string& evidence) {
+  find({Sensor::legs,
+        "leg_joints",
+        "the joints of the legs do not move as the robot does, under none of the changes that were tried",
+        evidence,
+        "robot.urdf: axes, origins and zeros of the joints of the legs, or the URDF of this robot; their names and order in the driver",
+        0,
+        "",
+        {},
+        true});
+}
+
+// Soles that slip by a third of the way are no support.
+bool Examination::is_no_way_of_legs(double scale, double sigma) {
+  constexpr double most_slip = 0.3;
+  return std::abs(scale - 1) > std::max(most_slip, sure * sigma);
+}
+
 }  // namespace kilvo::lab
