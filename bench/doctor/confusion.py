@@ -155,6 +155,7 @@ def description_cases(config, folder, work):
         out.append(("LiDAR's position left out", texts(key, p=0 * p), ["lidar_position"]))
         out.append(("LiDAR's least range in cm", ["lidar.min_range=30"], ["lidar_range"]))
         out.append(("LiDAR position in mm", texts(key, p=1000 * p), ["lidar_position", "lidar_unit"]))
+        out.append(("LiDAR position in cm", texts(key, p=100 * p), ["lidar_position", "lidar_unit"]))
         for ms in (5, -20, 100, 1000):
             out.append((f"LiDAR clock {ms} ms", [f"lidar.time_offset={ms / 1000}"], ["lidar_clock"]))
         if "camera" in config:
@@ -348,6 +349,10 @@ def data_cases(config):
         out += [("knees and ankles exchanged", each_legs(exchanged_in_both("knee", "ankle_pitch")), ["joints_exchanged"]),
                 ("hip rolls and yaws exchanged", each_legs(exchanged_in_both("hip_roll", "hip_yaw")), ["joints_exchanged"]),
                 ("a knee off by 15 degrees", each_legs(offset_of("right_knee_joint", math.radians(15))), ["joint_offset"]),
+                ("a knee off by 5 degrees", each_legs(offset_of("left_knee_joint", math.radians(5))), ["joint_offset"]),
+                ("a hip pitch off by 6 degrees", each_legs(offset_of("right_hip_pitch_joint", math.radians(6))), ["joint_offset"]),
+                ("a hip roll off by -6 degrees", each_legs(offset_of("left_hip_roll_joint", math.radians(-6))), ["joint_offset"]),
+                ("a hip yaw off by 8 degrees", each_legs(offset_of("left_hip_yaw_joint", math.radians(8))), ["joint_offset"]),
                 ("all joints the other way round", each_legs(negated), ["joint_sign"])]
     if "lidar" in config:
         out.append(("LiDAR's z flipped", mirrored, ["lidar_axes"]))

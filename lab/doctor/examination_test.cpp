@@ -342,6 +342,30 @@ TEST(Doctor, AJointOfAnotherZeroIsNamed) {
   EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("joint_offset"));
 }
 
+TEST(Doctor, AJointOfAZeroThatIsSomeDegreesOffIsNamedAndNoTurnedImu) {
+  for (const auto& [joint, degrees] :
+       {std::pair("left_knee_joint", 6.0), {"right_hip_pitch_joint", 6.0}, {"left_hip_roll_joint", -7.0}, {"left_hip_yaw_joint", 8.0}}) {
+    Recorded recorded = walked().recorded;
+    const auto place = static_cast<std::size_t>(std::ranges::find(recorded.joint_names, joint) - recorded.joint_names.begin());
+    ASSERT_LT(place, recorded.joint_names.size());
+    for (LegSample& s : recorded.legs) s.position[place] += degrees / 57.29578;
+    const Diagnosis diagnosis = Examination(recorded, walked().robot).run();
+    ASSERT_EQ(diagnosis.findings.size(), 1U) << joint;
+    EXPECT_EQ(diagnosis.findings[0].cause, "joint_offset") << joint;
+    EXPECT_THAT(diagnosis.findings[0].text, testing::HasSubstr(joint));
+    EXPECT_NEAR(diagnosis.findings[0].size, degrees, 1.5) << joint;
+  }
+}
+
+TEST(Doctor, PositionsInCentimetresAreNoMillimetres) {
+  Robot robot = walked().robot;
+  robot.lidar.T_imu_lidar.p *= 100;
+  const Diagnosis diagnosis = Examination(walked().recorded, robot).run();
+  ASSERT_EQ(diagnosis.findings.size(), 1U);
+  EXPECT_EQ(diagnosis.findings[0].cause, "lidar_unit");
+  EXPECT_THAT(diagnosis.findings[0].text, testing::HasSubstr("centimetres"));
+}
+
 // Their turning is not that of the gyro under any description, but the feet of a robot that walks are below it.
 TEST(Doctor, AnImuUpsideDownIsNamedThoughRoughEncodersTellNoTurning) {
   Recorded recorded = walked().recorded;

@@ -38,6 +38,16 @@ double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return degrees(std::acos(std::clamp(a.normalized().dot(b.normalized()), -1.0, 1.0)));
 }
 
+struct LengthUnit {
+  const char* name;
+  double metres;
+};
+
+// Of a length that is no number of metres, and would be below `least` in millimetres if it is in centimetres.
+LengthUnit unit_of(double length, double least) {
+  return 1e-3 * length < least ? LengthUnit{"centimetres", 1e-2} : LengthUnit{"millimetres", 1e-3};
+}
+
 bool mentions(const std::string& text, const std::string& word) {
   std::string lower;
   for (const char c : text) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -118,11 +128,12 @@ bool Examination::examine_leg_names() {
           true});
     std::swap(robot_.feet[0], robot_.feet[1]);
   }
-  constexpr double no_robot = 3;  // m
+  constexpr double no_robot = 3, near = 0.01;  // m
   if (Eigen::Vector3d& p = robot_.imu.T_link_imu.p; p.norm() > no_robot) {
     Finding f{Sensor::imu, "imu_mount_position", {}, "no robot is as large", {}, p.norm(), "m", {}, true};
-    f.text = fmt::format("the IMU's position of {:.0f} m on its link is in millimetres", p.norm());
-    p *= 1e-3;
+    const LengthUnit unit = unit_of(p.norm(), near);
+    f.text = fmt::format("the IMU's position of {:.0f} m on its link is in {}", p.norm(), unit.name);
+    p *= unit.metres;
     f.remedy = fmt::format("imu.T_link_imu.p: {}", vector_text(p));
     f.changes = {{"imu.T_link_imu.p", vector_text(p)}};
     find(std::move(f));
@@ -131,11 +142,12 @@ bool Examination::examine_leg_names() {
   for (auto& foot : robot_.feet) {
     for (const Eigen::Vector3d& corner : foot.sole) farthest = std::max(farthest, corner.norm());
   }
-  constexpr double no_foot = 1;  // m
+  constexpr double no_foot = 1, shortest_foot = 0.03;  // m
   if (farthest > no_foot) {
+    const LengthUnit unit = unit_of(farthest, shortest_foot);
     find({Sensor::legs,
           "sole_unit",
-          fmt::format("a corner of the soles is {:.0f} m from its link: they are in millimetres", farthest),
+          fmt::format("a corner of the soles is {:.0f} m from its link: they are in {}", farthest, unit.name),
           "no foot is as long",
           "robot.feet: sole, in metres",
           farthest,
@@ -143,7 +155,7 @@ bool Examination::examine_leg_names() {
           {},
           true});
     for (auto& foot : robot_.feet) {
-      for (Eigen::Vector3d& corner : foot.sole) corner *= 1e-3;
+      for (Eigen::Vector3d& corner : foot.sole) corner *= unit.metres;
     }
   }
   double largest = 0;
@@ -226,16 +238,6 @@ void Examination::examine_legs() {
 bool Examination::legs_turned() const {
   constexpr double least_turning = 0.15, least_weakest = 0.04;  // rad/s
   return legs_.turning >= least_turning && legs_.weakest >= least_weakest;
-}
-
-// A link that turns as this one does, and as it lies: only the place of the IMU would differ, which the turning does not show.
-bool Examination::turns_with_link(const LegHypothesis& other) const {
-  constexpr double rarely = 1;  // s
-  const std::vector<LegPose> here = legs_under(nullptr, rarely), there = legs_under(&other, rarely);
-  if (here.empty() || here.size() != there.size()) return false;
-  constexpr double alike = 0.17;  // rad
-  return std::ranges::all_of(std::array{std::size_t{0}, here.size() / 2, here.size() - 1},
-                             [&](std::size_t i) { return (there[i].foot[0].R_IF * here[i].foot[0].R_IF.inverse()).Log().norm() < alike; });
 }
 
 bool Examination::try_leg_hypotheses() {

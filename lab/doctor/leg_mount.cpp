@@ -1,5 +1,6 @@
 // The IMU on the link that the legs carry, and the legs' clock: by their turning, and by the feet that stand.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/core.h>
 #include <functional>
@@ -24,6 +25,16 @@ void adopt(const SO3& R, const Eigen::Vector3d& R_sigma, double offset, double o
 }
 
 }  // namespace
+
+// A link that turns as this one does, and as it lies: only the place of the IMU would differ, which the turning does not show.
+bool Examination::turns_with_link(const LegHypothesis& other) const {
+  constexpr double rarely = 1;  // s
+  const std::vector<LegPose> here = legs_under(nullptr, rarely), there = legs_under(&other, rarely);
+  if (here.empty() || here.size() != there.size()) return false;
+  constexpr double alike = 0.17;  // rad
+  return std::ranges::all_of(std::array{std::size_t{0}, here.size() / 2, here.size() - 1},
+                             [&](std::size_t i) { return (there[i].foot[0].R_IF * here[i].foot[0].R_IF.inverse()).Log().norm() < alike; });
+}
 
 // By the turning alone: each interval by the foot that turns as the gyro does. The foot that swings turns as well: no mount that puts the
 // robot on its head.

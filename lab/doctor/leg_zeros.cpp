@@ -8,20 +8,30 @@
 
 namespace kilvo::lab {
 
-// A zero that is far off bends all that the fit finds towards it: the one joint with which the soles stand much better, when its zero may
-// be anything.
+// A zero that is far off bends all that the fit finds towards it: the one joint with which the soles stand better, when its zero may
+// be anything. The zero of one hip alone looks like half of it in each hip and a turned IMU: it is the zero where the turn disappears.
 bool Examination::find_wrong_zero(const StanceFit& stances, const Robot& start) {
-  constexpr double suspicious = 0.8, least = 4;  // degrees
-  constexpr double much_better = 0.88;           // of how far standing feet seem to move
-  if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "joint_offset"; })) return false;
-  if (std::ranges::none_of(stances.zero, [](double zero) { return std::abs(degrees(zero)) > suspicious; })) return false;
+  constexpr double least = 4, looked_at = 2;                  // degrees
+  constexpr double worth_a_look = 2;                          // standard deviations
+  constexpr double better = 0.95, better_than_turned = 0.97;  // of how far standing feet seem to move
+  constexpr double turned = 2.5, turn_left = 0.33;            // degrees, share of it
+  constexpr std::ptrdiff_t most = 2;                          // joints
+  if (std::ranges::count(diagnosis_.findings, "joint_offset", &Finding::cause) >= most) return false;
+  const auto turn_of = [&](const StanceFit& fit) { return degrees((fit.R_link_imu * robot_.imu.T_link_imu.R.inverse()).Log().norm()); };
   std::optional<std::size_t> joint;
   StanceFit best = stances;
+  double least_beyond = 0;
   for (std::size_t i = 0; i < stances.joints.size(); ++i) {
+    const double predicted = std::abs(stances.zero_alone[i] * stances.zero[i]);
+    if (degrees(predicted) < looked_at || predicted < worth_a_look * std::abs(stances.zero_alone[i]) * stances.zero_sigma[i]) continue;
     StanceFit free = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, lidar_way(), gyro(), stances.offset, {i, false});
-    const double size = std::abs(free.good ? free.zero[i] : 0);
+    const double size = std::abs(free.good ? free.zero[i] : 0), cost = free.moved / stances.moved;
     if (degrees(size) < least || size < sure_among(stances.joints.size()) * free.zero_sigma[i]) continue;
-    if (free.moved > std::min(best.moved, much_better * stances.moved)) continue;
+    if (turn_of(free) > std::max(turned, turn_of(stances))) continue;
+    const bool instead_of_turn = turn_of(stances) > turned && turn_of(free) < turn_left * turn_of(stances);
+    const double beyond = cost - (instead_of_turn ? better_than_turned : better);
+    if (beyond > least_beyond) continue;
+    least_beyond = beyond;
     best = std::move(free);
     joint = i;
   }

@@ -56,8 +56,9 @@ void Examination::examine_lidar_position() {
   }
   if (described.norm() > 3) {
     f.cause = "lidar_unit";
-    f.text = fmt::format("the LiDAR's position of {:.0f} m on the IMU is in millimetres", described.norm());
-    right = 1e-3 * described;
+    const bool centimetres = (fit.r - 1e-2 * described).norm() < (fit.r - 1e-3 * described).norm();
+    f.text = fmt::format("the LiDAR's position of {:.0f} m on the IMU is in {}metres", described.norm(), centimetres ? "centi" : "milli");
+    right = (centimetres ? 1e-2 : 1e-3) * described;
   } else if ((fit.r - inverse).norm() < tolerance && (fit.r - inverse).norm() < 0.5 * error.norm()) {
     f.cause = "lidar_inverted";
     f.text = "the LiDAR's mount is given the wrong way round (the IMU in the LiDAR's frame)";
