@@ -212,7 +212,7 @@ def description_cases(config, folder, work):
         out.append(("camera's fx halved", [f"camera.fx={config['camera']['fx'] / 2}"], ["camera_focal"]))
         out.append(("camera's fx and fy halved", [f"camera.fx={config['camera']['fx'] / 2}", f"camera.fy={config['camera']['fy'] / 2}"], ["camera_focal"]))
         out.append(("camera's cx and cy swapped", [f"camera.cx={config['camera']['cy']}", f"camera.cy={config['camera']['cx']}"], ["camera_principal_point"]))
-        out.append(("camera position in mm", texts(key, p=1000 * np.maximum(np.abs(p), 0.02)), ["camera_unit"]))
+        out.append(("camera position in mm", texts(key, p=1000 * np.copysign(np.maximum(np.abs(p), 0.02), p)), ["camera_unit"]))
         out.append(("camera's size", ["camera.width=1280", "camera.height=1024"], ["camera_size"]))
         for ms in (10, 200):
             out.append((f"camera's clock {ms} ms", [f"camera.time_offset={ms / 1000}"], ["camera_clock"]))

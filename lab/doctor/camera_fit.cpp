@@ -57,6 +57,21 @@ Eigen::Vector3d direction_of(const std::vector<Eigen::Vector3d>& normals) {
   return t;
 }
 
+// Of the principal point in focal lengths, and of the logarithm of fy / fx.
+constexpr double lens_prior = 0.5;
+
+// See CameraFit.
+CameraMount with_lens(const CameraMount& mount, const Eigen::VectorXd& lens) {
+  CameraMount out = mount;
+  out.cx += lens[0] * mount.fx;
+  out.cy += lens[1] * mount.fy;
+  out.fy *= std::exp(lens[2]);
+  if (out.distortion.empty()) out.distortion.resize(4, 0);
+  out.distortion[0] += lens[3];
+  out.distortion[1] += lens[4];
+  return out;
+}
+
 }  // namespace
 
 CameraTracks::CameraTracks(const std::vector<TrackedPair>& tracks, const GyroPath& gyro, const LidarWay* way) : gyro_(gyro), way_(way) {
@@ -144,14 +159,15 @@ CameraFit CameraTracks::fit(const CameraGuess& guess, bool with_focal, bool with
 CameraFit CameraTracks::fit_with_position(const CameraGuess& guess) const {
   const CameraFit first = fit(guess, Free{true, true, true});
   if (!first.fit.good) return first;
-  CameraGuess near = guess;
-  near.mount.T_imu_camera = {first.R_IC, first.p_IC};
-  near.mount.fx *= first.focal;
-  near.mount.fy *= first.focal;
-  near.offset = first.offset;
-  CameraFit out = fit(near, Free{true, true, true});
+  CameraFit out = fit({first.mount, first.offset}, Free{true, true, true});
   out.focal *= first.focal;
   return out;
+}
+
+// The same: a distortion means another thing with another focal length.
+CameraFit CameraTracks::fit_with_lens(const CameraGuess& guess) const {
+  const CameraFit first = fit(guess, Free{true, true, false, true});
+  return first.fit.good ? fit({first.mount, first.offset}, Free{true, true, false, true}) : first;
 }
 
 CameraFit CameraTracks::fit(const CameraGuess& guess, const Free& free) const {
@@ -169,22 +185,37 @@ CameraFit CameraTracks::fit(const CameraGuess& guess, const Free& free) const {
   const auto mount_at = [&](const Eigen::VectorXd& x) {
     return SE3{described.R * SO3::Exp(x.head<3>()), free.position ? Eigen::Vector3d(described.p + x.tail<3>()) : described.p};
   };
+  Eigen::VectorXd lens = Eigen::VectorXd::Zero(5);
   const auto rows = [&](const Eigen::VectorXd& x, Residuals& r) {
+    // Other rays only where the lens is another one.
+    if (free.lens && x.tail<5>() != lens) {
+      lens = x.tail<5>();
+      rays = rays_of(with_lens(guess.mount, lens));
+    }
     residuals(guess, rays, mount_at(x), std::exp(std::clamp(x[3], -2.0, 2.0)), guess.offset + std::clamp(x[4], -camera_slack, camera_slack),
               1, r);
   };
-  const int parameters = free.position ? 8 : 5;
+  const int parameters = free.position ? 8 : free.lens ? 10 : 5;
   Eigen::VectorXd start = Eigen::VectorXd::Zero(parameters), prior = Eigen::VectorXd::Ones(parameters),
                   step = Eigen::VectorXd::Constant(parameters, 1e-3);
   prior.head<5>() << INFINITY, INFINITY, INFINITY, free.focal ? 1.0 : 1e-6, free.offset ? 1.0 : 1e-7;
   step[4] = 5e-4;
-  out.fit = robust_fit(rows, start, prior, step, 8);
+  if (free.lens) prior.tail<5>() << lens_prior, lens_prior, lens_prior, 1, 1;
+  try {
+    out.fit = robust_fit(rows, start, prior, step, 8);
+  } catch (const std::invalid_argument&) {
+    return out;  // the search left what a lens can be
+  }
   if (!out.fit.good) return out;
   const SE3 found = mount_at(out.fit.x);
   out.R_IC = found.R;
   out.p_IC = found.p;
   out.focal = std::exp(out.fit.x[3]);
   out.offset = guess.offset + out.fit.x[4];
+  out.mount = free.lens ? with_lens(guess.mount, out.fit.x.tail<5>()) : guess.mount;
+  out.mount.T_imu_camera = found;
+  out.mount.fx *= out.focal;
+  out.mount.fy *= out.focal;
   out.error = out.fit.scale;
   return out;
 }

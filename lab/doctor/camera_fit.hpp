@@ -37,11 +37,14 @@ struct CameraGuess {
 };
 
 struct CameraFit {
-  Fit fit;  // rotation (3, camera frame), log of the focal length (1), offset (1); with the position that (3, IMU frame, m)
+  // Rotation (3, camera frame), log of the focal length (1), offset (1); with the position that (3, IMU frame, m), or with the lens that
+  // (5): principal point (2, focal lengths), log of fy / fx, k1, k2.
+  Fit fit;
   SO3 R_IC;
   Eigen::Vector3d p_IC = Eigen::Vector3d::Zero();  // m
   double focal = 1;                                // times the focal lengths of the guess
   double offset = 0;                               // s
+  CameraMount mount;                               // with all that was found
   double error = 0;                                // px, robust standard deviation across the epipolar lines
 };
 
@@ -55,6 +58,8 @@ class CameraTracks {
   CameraFit fit(const CameraGuess& guess, bool with_focal, bool with_offset) const;
   /// Of all of it, the position included: the camera turns with the robot, and so goes a way of its own. Only the LiDAR's way shows that.
   CameraFit fit_with_position(const CameraGuess& guess) const;
+  /// Of all of it but the position, with the lens: principal point, fy against fx and radial distortion.
+  CameraFit fit_with_lens(const CameraGuess& guess) const;
   /// The best of all rotations, whatever that of the guess.
   CameraFit fit_any_rotation(const CameraGuess& guess) const;
   /// Offsets at which the images' motion is strong when the gyro's is; the likeliest first.
@@ -62,7 +67,7 @@ class CameraTracks {
 
  private:
   struct Free {
-    bool focal, offset, position;
+    bool focal, offset, position, lens = false;
   };
   CameraFit fit(const CameraGuess& guess, const Free& free) const;
   void residuals(const CameraGuess& guess, const std::vector<std::vector<Eigen::Vector4d>>& rays, const SE3& T_IC, double focal,

@@ -1,6 +1,8 @@
 // Corners of a world that is known, followed by a camera whose mount is not.
 #include "lab/doctor/camera_fit.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <random>
@@ -121,6 +123,18 @@ TEST(CameraTracks, FindWhereTheCameraIs) {
       EXPECT_LT(fit.fit.sigma(5 + i), 0.01) << i;
     }
     EXPECT_NEAR(fit.focal, 1, 0.005) << off.transpose();
+  }
+  for (const auto& lens : {std::array{30.0, -20.0, 1.0, 0.0}, {0.0, 0.0, 1.15, 0.0}, {0.0, 0.0, 1.0, 0.25}}) {
+    CameraMount described = mount;
+    described.cx += lens[0], described.cy += lens[1], described.fy *= lens[2];
+    described.distortion = {lens[3], 0, 0, 0};
+    const CameraFit fit = tracks.fit_with_lens({described, 0});
+    ASSERT_TRUE(fit.fit.good);
+    EXPECT_NEAR(fit.mount.cx, mount.cx, 4) << lens[0];
+    EXPECT_NEAR(fit.mount.cy, mount.cy, 4) << lens[1];
+    EXPECT_NEAR(fit.mount.fy / fit.mount.fx, 1, 0.005) << lens[2];
+    EXPECT_NEAR(fit.mount.distortion[0], 0, 0.02) << lens[3];
+    EXPECT_LT(fit.error, 0.95 * std::min(tracks.fit({described, 0}, true, true).error, tracks.fit_with_position({described, 0}).error));
   }
   CameraMount longer = mount;
   longer.fx *= 1.2, longer.fy *= 1.2;

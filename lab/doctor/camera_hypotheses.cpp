@@ -41,6 +41,17 @@ std::vector<CameraHypothesis> hypotheses(const CameraMount& m) {
   std::swap(c.cx, c.cy);
   add("camera_principal_point", "cx and cy of the camera are exchanged", "camera.cx, camera.cy", c,
       {{"camera.cx", number_text(c.cx)}, {"camera.cy", number_text(c.cy)}});
+  constexpr double alike = 0.1;  // as focal lengths are
+  if (m.cx > 0 && std::abs(m.cy / m.cx - 1) < alike) {
+    c = m;
+    std::swap(c.fx, c.cx);
+    std::swap(c.fy, c.cy);
+    add("camera_focal", "fx and fy of the camera are exchanged with cx and cy", "camera.fx, camera.fy, camera.cx, camera.cy", c,
+        {{"camera.fx", number_text(c.fx)},
+         {"camera.fy", number_text(c.fy)},
+         {"camera.cx", number_text(c.cx)},
+         {"camera.cy", number_text(c.cy)}});
+  }
   for (const double factor : {2.0, 0.5}) {
     c = m;
     c.fx *= factor;

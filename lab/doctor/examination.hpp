@@ -169,8 +169,8 @@ class Examination {
   void examine_camera_fit(const CameraTracks& tracks);
   void accuse_camera_rotation(const SO3& R_IC, const std::string& evidence);
   bool examine_camera_position(const CameraTracks& tracks, const CameraFit& fit, const CameraFit& placed);
-  bool accuse_lens(const CameraTracks& tracks, const CameraFit& fit, bool surely);
-  bool accuse_principal_point(const CameraTracks& tracks, const CameraFit& fit, double other);
+  // camera_lens.cpp
+  bool examine_lens(const CameraTracks& tracks, double otherwise);
 
   GyroPath gyro() const { return {recorded_.imu, gyro_axes_, gyro_bias_}; }
   SenseAgreement agreement(const std::vector<Turn>& turns, const SO3& mount, double least_explained) const;
@@ -220,6 +220,14 @@ std::vector<Turn> turns_of(const std::vector<SweepPose>& way);
 std::string rotation_text(const SO3& R);  // as YAML, row by row
 std::string vector_text(const Eigen::Vector3d& p);
 std::string number_text(double x);
+struct LengthUnit {
+  const char* name;
+  double metres;
+};
+/// Of a length that is no number of metres, and would be below `least` (m) if it was in millimetres.
+inline LengthUnit unit_of(double length, double least) {
+  return 1e-3 * length < least ? LengthUnit{"centimetres", 1e-2} : LengthUnit{"millimetres", 1e-3};
+}
 /// With what is taken of a refinement in degrees about the axes of the rotated frame.
 SO3 turned_by(const SO3& described, const Refinement& r);
 /// "5.0 degrees about y": the axis is named when the rotation is about one.

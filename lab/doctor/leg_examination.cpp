@@ -38,16 +38,6 @@ double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return degrees(std::acos(std::clamp(a.normalized().dot(b.normalized()), -1.0, 1.0)));
 }
 
-struct LengthUnit {
-  const char* name;
-  double metres;
-};
-
-// Of a length that is no number of metres, and would be below `least` in millimetres if it is in centimetres.
-LengthUnit unit_of(double length, double least) {
-  return 1e-3 * length < least ? LengthUnit{"centimetres", 1e-2} : LengthUnit{"millimetres", 1e-3};
-}
-
 bool mentions(const std::string& text, const std::string& word) {
   std::string lower;
   for (const char c : text) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));

@@ -13,7 +13,7 @@ namespace kilvo::lab {
 bool Examination::find_wrong_zero(const StanceFit& stances, const Robot& start) {
   constexpr double least = 4, looked_at = 2;                  // degrees
   constexpr double worth_a_look = 2;                          // standard deviations
-  constexpr double better = 0.95, better_than_turned = 0.97;  // of how far standing feet seem to move
+  constexpr double better = 0.95, better_than_turned = 1.01;  // of how far standing feet seem to move
   constexpr double turned = 2.5, turn_left = 0.33;            // degrees, share of it
   constexpr std::ptrdiff_t most = 2;                          // joints
   if (std::ranges::count(diagnosis_.findings, "joint_offset", &Finding::cause) >= most) return false;
