@@ -89,6 +89,8 @@ def leg_cases(config, folder, work, texts, pose, rotation):
     urdf("URDF in millimetres", origins(text, ".", lambda x: [1000 * a for a in x]), ["urdf", "leg_lengths"])
     urdf("hips 5 cm wider", origins(text, "hip_(roll|pitch)", lambda x: [x[0], x[1] + math.copysign(0.05, x[1]) if abs(x[1]) > 0.03 else x[1], x[2]]), ["urdf", "leg_lengths"])
     urdf("shins 15 % shorter", origins(text, "ankle_pitch", lambda x: [0.85 * a for a in x]), ["leg_lengths"])
+    urdf("shins 5 % longer", origins(text, "ankle_pitch", lambda x: [1.05 * a for a in x]), ["leg_lengths"])
+    urdf("one shin 5 % longer", origins(text, "left_ankle_pitch", lambda x: [1.05 * a for a in x]), ["leg_lengths"])
     urdf("thighs 7 % longer", origins(text, "knee", lambda x: [1.07 * a for a in x]), ["leg_lengths"])
 
     def flipped(text, joint):

@@ -13,6 +13,7 @@ namespace {
 constexpr double window = 1.0;                  // s, of a displacement
 constexpr double least_way = 0.12;              // m in a window
 constexpr double scale_tolerance = 0.035;       // soles that slip and roll take 1 %
+constexpr double agreed_tolerance = 0.013;      // where the robot stands as much higher
 constexpr double stance_tolerance = 0.02;       // links are known to 1 %
 constexpr double leg_height_tolerance = 0.028;  // m: ground that gives way takes 2 cm
 
@@ -227,8 +228,9 @@ void Examination::examine_leg_lengths() {
   const auto& [by_way, sigma, windows, height, uneven] = way;
   // The feet that stand tell it better than the way over soles that roll; a place of the IMU that is wrong would spoil that, and show as a
   // height that these legs do not explain.
-  constexpr double floor_is_even = 0.025;  // m
-  if (uneven && std::abs(*uneven) > floor_is_even) {
+  constexpr double floor_is_even = 0.025, legs_are_even = 0.012, far_enough = 0.925;  // m, m, of the way: two legs disagree
+  const bool disagree = by_way + sigma < far_enough && !is_no_way_of_legs(by_way, sigma);
+  if (uneven && std::abs(*uneven) > (disagree ? legs_are_even : floor_is_even)) {
     accuse_uneven_legs(*uneven);
     return;
   }
@@ -238,7 +240,8 @@ void Examination::examine_leg_lengths() {
   const auto explains = [&](double s) {
     return !height || std::abs(*height - expected(s)) < std::max(leg_height_tolerance, 0.5 * std::abs(expected(s)));
   };
-  bool scale_wrong = std::abs(scale - 1) > std::max(scale_tolerance, sure * sigma);
+  const bool agreed = height && std::abs(*height - expected(scale)) < 0.5 * std::abs(expected(scale));
+  bool scale_wrong = std::abs(scale - 1) > std::max(agreed ? agreed_tolerance : scale_tolerance, sure * sigma);
   if (scale_wrong && accuse_exchanged_legs(scale, detail_of(scale, sigma, windows, height))) return;
   // The way of a robot that runs, slips or rolls over its soles is not that of its legs, but it stands as high as described.
   const bool slips = scale_wrong && (!explains(scale) || (height && std::abs(*height - expected(scale)) > std::abs(*height)));
@@ -247,10 +250,7 @@ void Examination::examine_leg_lengths() {
     if (!accuse_lidar_instead(1 / scale, way_detail)) accuse_leg_joints(way_detail);
     return;
   }
-  if (slips) {
-    scale = 1;
-    scale_wrong = false;
-  }
+  if (slips) std::tie(scale, scale_wrong) = std::pair(1.0, false);
   if (stances_ && !scale_wrong) {
     const double by_stances = 1 / stances_->scale;
     if (explains(by_stances) && std::abs(by_stances - 1) > std::max(stance_tolerance, sure * stances_->scale_sigma)) {

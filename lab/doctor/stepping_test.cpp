@@ -19,6 +19,7 @@ std::vector<LegPose> legs(double seconds, const std::function<Eigen::Vector3d(do
   for (double t = 0; t < seconds; t += 0.01) {
     LegPose pose;
     pose.t = t;
+    pose.foot[0].p[0].setZero();
     pose.foot[1].p[0] = Eigen::Vector3d(0, 0.2, 0) + apart(t);
     out.push_back(pose);
   }
