@@ -219,7 +219,10 @@ void Findings::judge_biases(const Situation& now) {
   const auto beyond = [&](const Biases& before, double accel, double gyro) {
     return (present.accel - before.accel).norm() > accel + 3 * accel_sigma || (present.gyro - before.gyro).norm() > gyro + 3 * gyro_sigma;
   };
+  // The shocks of the first steps, cut by the accelerometer's range, turn bias and gravity for a second or two.
   const bool impossible = beyond(*first_biases_, impossible_accel, largest_gyro_bias);
+  impossible_since_ = impossible ? std::optional(impossible_since_.value_or(now.t)) : std::nullopt;
+  if (impossible && now.t - *impossible_since_ < 2 * streams_period) return;
   if (impossible ? statistics_.diverged : strange_biases_ || !beyond(*known_biases_, strange_accel, largest_resting_rate)) return;
   strange_biases_ = true;
   const Biases& before = impossible ? *first_biases_ : *known_biases_;

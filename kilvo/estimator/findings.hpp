@@ -89,6 +89,7 @@ class Findings {
     Eigen::Vector3d accel, gyro;  // m/s^2, rad/s
   };
   std::optional<Biases> first_biases_, known_biases_;  // at the start; when they were known
+  std::optional<Time> impossible_since_;
   bool strange_biases_ = false;
   struct Unmeasured {
     std::optional<Time> since;

@@ -95,6 +95,9 @@ TEST_F(Judged, BiasesThatWereAGuessMayChangeAndThoseThatAreKnownMayNot) {
   EXPECT_THAT(warnings(), testing::Contains(AllOf(HasSubstr("the IMU and the LiDAR contradict each other"), HasSubstr("biases"))));
   EXPECT_FALSE(diverged());
   walk_with(1, 0.02, {0, 1.8, -0.7});
+  walk_with(1, 0.02, {0.45, 0, 0.1});
+  EXPECT_FALSE(diverged()) << "the shocks of a first step";
+  walk_with(3, 0.02, {0, 1.8, -0.7});
   EXPECT_TRUE(diverged());
 }
 

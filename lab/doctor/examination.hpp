@@ -110,6 +110,7 @@ class Examination {
   /// Of the legs' turning: a sole rolls one way for half of a quick step.
   double independent_turns() const { return 3 * stepping_.seconds() / 0.25; }
   bool examine_leg_names();
+  void examine_length_units();
   bool examine_joint_values();
   void examine_locked_joints();
   /// Legs that hardly turn show how they bend, not how they are mounted.

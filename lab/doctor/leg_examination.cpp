@@ -103,21 +103,7 @@ Examination::LegScore Examination::score_legs(const std::vector<LegPose>& path, 
   return out;
 }
 
-bool Examination::examine_leg_names() {
-  const auto& feet = robot_.feet;
-  const bool swapped = mentions(feet[0].link, "right") && mentions(feet[1].link, "left");
-  if (swapped) {
-    find({Sensor::legs,
-          "feet_swapped",
-          fmt::format("left and right foot are swapped in the configuration: left is {}, right is {}", feet[0].link, feet[1].link),
-          "the names of the links",
-          "robot.feet: exchange the links (and soles) of left and right",
-          0,
-          "",
-          {},
-          true});
-    std::swap(robot_.feet[0], robot_.feet[1]);
-  }
+void Examination::examine_length_units() {
   constexpr double no_robot = 3, near = 0.01;  // m
   if (Eigen::Vector3d& p = robot_.imu.T_link_imu.p; p.norm() > no_robot) {
     Finding f{Sensor::imu, "imu_mount_position", {}, "no robot is as large", {}, p.norm(), "m", {}, true};
@@ -148,6 +134,24 @@ bool Examination::examine_leg_names() {
       for (Eigen::Vector3d& corner : foot.sole) corner *= unit.metres;
     }
   }
+}
+
+bool Examination::examine_leg_names() {
+  const auto& feet = robot_.feet;
+  const bool swapped = mentions(feet[0].link, "right") && mentions(feet[1].link, "left");
+  if (swapped) {
+    find({Sensor::legs,
+          "feet_swapped",
+          fmt::format("left and right foot are swapped in the configuration: left is {}, right is {}", feet[0].link, feet[1].link),
+          "the names of the links",
+          "robot.feet: exchange the links (and soles) of left and right",
+          0,
+          "",
+          {},
+          true});
+    std::swap(robot_.feet[0], robot_.feet[1]);
+  }
+  examine_length_units();
   double largest = 0;
   std::size_t beyond = 0, count = 0;
   for (const LegSample& s : recorded_.legs) {

@@ -14,6 +14,7 @@ constexpr double window = 1.0;                  // s, of a displacement
 constexpr double least_way = 0.12;              // m in a window
 constexpr double scale_tolerance = 0.035;       // soles that slip and roll take 1 %
 constexpr double agreed_tolerance = 0.013;      // where the robot stands as much higher
+constexpr double slip_tolerance = 0.08;         // of a way that is too short, where nothing tells the height
 constexpr double stance_tolerance = 0.02;       // links are known to 1 %
 constexpr double leg_height_tolerance = 0.028;  // m: ground that gives way takes 2 cm
 
@@ -241,22 +242,20 @@ void Examination::examine_leg_lengths() {
     return !height || std::abs(*height - expected(s)) < std::max(leg_height_tolerance, 0.5 * std::abs(expected(s)));
   };
   const bool agreed = height && std::abs(*height - expected(scale)) < 0.5 * std::abs(expected(scale));
-  bool scale_wrong = std::abs(scale - 1) > std::max(agreed ? agreed_tolerance : scale_tolerance, sure * sigma);
+  const double tolerance = agreed ? agreed_tolerance : height || scale > 1 ? scale_tolerance : slip_tolerance;
+  bool scale_wrong = std::abs(scale - 1) > std::max(tolerance, sure * sigma);
   if (scale_wrong && accuse_exchanged_legs(scale, detail_of(scale, sigma, windows, height))) return;
   // The way of a robot that runs, slips or rolls over its soles is not that of its legs, but it stands as high as described.
   const bool slips = scale_wrong && (!explains(scale) || (height && std::abs(*height - expected(scale)) > std::abs(*height)));
   if (slips && is_no_way_of_legs(scale, sigma)) {
     const std::string way_detail = detail_of(scale, sigma, windows, height);
-    if (!accuse_lidar_instead(1 / scale, way_detail)) accuse_leg_joints(way_detail);
-    return;
+    return accuse_lidar_instead(1 / scale, way_detail) ? void() : accuse_leg_joints(way_detail);
   }
   if (slips) std::tie(scale, scale_wrong) = std::pair(1.0, false);
   if (stances_ && !scale_wrong) {
     const double by_stances = 1 / stances_->scale;
-    if (explains(by_stances) && std::abs(by_stances - 1) > std::max(stance_tolerance, sure * stances_->scale_sigma)) {
-      scale = by_stances;
-      scale_wrong = true;
-    }
+    if (explains(by_stances) && std::abs(by_stances - 1) > std::max(stance_tolerance, sure * stances_->scale_sigma))
+      std::tie(scale, scale_wrong) = std::pair(by_stances, true);
   }
   // A LiDAR that was found elsewhere is known to some centimetres only.
   const bool moved = std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "lidar_position"; });
