@@ -34,7 +34,8 @@ struct LensChange {
 // `otherwise`: px, as close as the corners come to their lines without another lens.
 bool Examination::examine_lens(const CameraTracks& tracks, double otherwise) {
   constexpr double better = 0.95;  // a camera that is turned or moved leaves 0.98 or more
-  const auto of_lens = [](const Finding& f) { return f.cause == "camera_lens" || f.cause == "camera_principal_point"; };
+  constexpr std::array causes{"camera_lens", "camera_principal_point", "camera_focal"};
+  const auto of_lens = [&](const Finding& f) { return std::ranges::find(causes, f.cause) != causes.end(); };
   if (std::ranges::any_of(diagnosis_.findings, of_lens)) return false;
   const CameraFit fit = tracks.fit_with_lens({robot_.camera, 0});
   if (!fit.fit.good || fit.error > better * otherwise) return false;
@@ -56,8 +57,7 @@ bool Examination::examine_lens(const CameraTracks& tracks, double otherwise) {
   }
   f.evidence = fmt::format(
       "corners of the images are {:.2f} px from their epipolar lines with fx {:.1f}, fy {:.1f}, cx {:.1f}, cy {:.1f}, distortion {}; "
-      "{:.2f} px with "
-      "any rotation, place and focal length of the camera",
+      "{:.2f} px with any rotation, place and focal length of the camera",
       fit.error, is.fx, is.fy, is.cx, is.cy, k, otherwise);
   f.remedy = "camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion: those of this lens and this size of image";
   const std::array<std::pair<const char*, double>, 4> numbers{{{"fx", is.fx}, {"fy", is.fy}, {"cx", is.cx}, {"cy", is.cy}}};
