@@ -249,13 +249,19 @@ void Examination::examine_leg_lengths() {
   const bool slips = scale_wrong && (!explains(scale) || (height && std::abs(*height - expected(scale)) > std::abs(*height)));
   if (slips && is_no_way_of_legs(scale, sigma)) {
     const std::string way_detail = detail_of(scale, sigma, windows, height);
-    return accuse_lidar_instead(1 / scale, way_detail) ? void() : accuse_leg_joints(way_detail);
+    if (!accuse_lidar_instead(1 / scale, way_detail)) accuse_leg_joints(way_detail);
+    return;
   }
-  if (slips) std::tie(scale, scale_wrong) = std::pair(1.0, false);
+  if (slips) {
+    scale = 1;
+    scale_wrong = false;
+  }
   if (stances_ && !scale_wrong) {
     const double by_stances = 1 / stances_->scale;
-    if (explains(by_stances) && std::abs(by_stances - 1) > std::max(stance_tolerance, sure * stances_->scale_sigma))
-      std::tie(scale, scale_wrong) = std::pair(by_stances, true);
+    if (explains(by_stances) && std::abs(by_stances - 1) > std::max(stance_tolerance, sure * stances_->scale_sigma)) {
+      scale = by_stances;
+      scale_wrong = true;
+    }
   }
   // A LiDAR that was found elsewhere is known to some centimetres only.
   const bool moved = std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "lidar_position"; });
@@ -275,25 +281,6 @@ void Examination::examine_leg_lengths() {
     accuse_imu_place(*height);
   }
   diagnosis_.findings.back().evidence = detail;
-}
-
-void Examination::accuse_leg_lengths(double scale, double height) {
-  // The stances show mount and clock with legs of these lengths only.
-  constexpr double by_lengths = 5, clock_by_lengths = 0.01;  // degrees, s
-  std::erase_if(diagnosis_.findings, [](const Finding& f) {
-    return (f.cause == "imu_mount_rotation" && f.size < by_lengths) || (f.cause == "legs_clock" && std::abs(f.size) < clock_by_lengths);
-  });
-  Finding f{Sensor::legs, "leg_lengths", {}, {}, {}, scale - 1, {}, {}, true};
-  f.text = fmt::format("the legs of the URDF are too {}: the robot walks {:.1f} % {} by its legs than by the LiDAR and stands {:.1f} cm {}",
-                       scale > 1 ? "long" : "short", 100 * std::abs(scale - 1), scale > 1 ? "farther" : "less far", 100 * std::abs(height),
-                       height > 0 ? "higher" : "lower");
-  f.remedy = "robot.urdf: the lengths of thigh and shin, or the URDF of this robot";
-  if (scale < 0.4 || scale > 2.5) {
-    f.cause = "urdf";
-    f.text = fmt::format("the legs of the URDF are not those of this robot: by them it walks {:.2f} times as far as by the LiDAR", scale);
-    f.remedy = "robot.urdf, or names, signs and zeros of the joints in the messages";
-  }
-  find(std::move(f));
 }
 
 }  // namespace kilvo::lab

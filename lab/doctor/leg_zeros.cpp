@@ -1,4 +1,4 @@
-// What the stances show of the legs themselves: zeros of the joints, where the feet are; legs of two lengths.
+// What is wrong with the legs themselves: zeros of the joints and where the feet are, by the stances; their lengths.
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
@@ -11,25 +11,26 @@ namespace kilvo::lab {
 // A zero that is far off bends all that the fit finds towards it: the one joint with which the soles stand better, when its zero may
 // be anything. The zero of one hip alone looks like half of it in each hip and a turned IMU: it is the zero where the turn disappears.
 bool Examination::find_wrong_zero(const StanceFit& stances, const Robot& start) {
-  constexpr double least = 4, looked_at = 2;                  // degrees
-  constexpr double worth_a_look = 2;                          // standard deviations
-  constexpr double better = 0.95, better_than_turned = 1.01;  // of how far standing feet seem to move
-  constexpr double turned = 2.5, turn_left = 0.33;            // degrees, share of it
-  constexpr std::ptrdiff_t most = 2;                          // joints
+  constexpr double least = 4, least_predicted = 2;  // degrees
+  constexpr double predicted_sigmas = 2;            // standard deviations
+  constexpr double better = 0.95, no_worse = 1.01;  // of how far standing feet seem to move
+  constexpr double turned = 2.5, turn_left = 0.33;  // degrees, share of it
+  constexpr std::ptrdiff_t most = 2;                // joints
   if (std::ranges::count(diagnosis_.findings, "joint_offset", &Finding::cause) >= most) return false;
   const auto turn_of = [&](const StanceFit& fit) { return degrees((fit.R_link_imu * robot_.imu.T_link_imu.R.inverse()).Log().norm()); };
   std::optional<std::size_t> joint;
   StanceFit best = stances;
   double least_beyond = 0;
   for (std::size_t i = 0; i < stances.joints.size(); ++i) {
-    const double predicted = std::abs(stances.zero_alone[i] * stances.zero[i]);
-    if (degrees(predicted) < looked_at || predicted < worth_a_look * std::abs(stances.zero_alone[i]) * stances.zero_sigma[i]) continue;
+    const double predicted = std::abs(stances.zero_growth[i] * stances.zero[i]);
+    if (degrees(predicted) < least_predicted || predicted < predicted_sigmas * std::abs(stances.zero_growth[i]) * stances.zero_sigma[i])
+      continue;
     StanceFit free = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, lidar_way(), gyro(), stances.offset, {i, false});
     const double size = std::abs(free.good ? free.zero[i] : 0), cost = free.moved / stances.moved;
     if (degrees(size) < least || size < sure_among(stances.joints.size()) * free.zero_sigma[i]) continue;
     if (turn_of(free) > std::max(turned, turn_of(stances))) continue;
     const bool instead_of_turn = turn_of(stances) > turned && turn_of(free) < turn_left * turn_of(stances);
-    const double beyond = cost - (instead_of_turn ? better_than_turned : better);
+    const double beyond = cost - (instead_of_turn ? no_worse : better);
     if (beyond > least_beyond) continue;
     least_beyond = beyond;
     best = std::move(free);
@@ -91,6 +92,25 @@ void Examination::accuse_uneven_legs(double uneven) {
         "m",
         {},
         true});
+}
+
+void Examination::accuse_leg_lengths(double scale, double height) {
+  // The stances show mount and clock with legs of these lengths only.
+  constexpr double by_lengths = 5, clock_by_lengths = 0.01;  // degrees, s
+  std::erase_if(diagnosis_.findings, [](const Finding& f) {
+    return (f.cause == "imu_mount_rotation" && f.size < by_lengths) || (f.cause == "legs_clock" && std::abs(f.size) < clock_by_lengths);
+  });
+  Finding f{Sensor::legs, "leg_lengths", {}, {}, {}, scale - 1, {}, {}, true};
+  f.text = fmt::format("the legs of the URDF are too {}: the robot walks {:.1f} % {} by its legs than by the LiDAR and stands {:.1f} cm {}",
+                       scale > 1 ? "long" : "short", 100 * std::abs(scale - 1), scale > 1 ? "farther" : "less far", 100 * std::abs(height),
+                       height > 0 ? "higher" : "lower");
+  f.remedy = "robot.urdf: the lengths of thigh and shin, or the URDF of this robot";
+  if (scale < 0.4 || scale > 2.5) {
+    f.cause = "urdf";
+    f.text = fmt::format("the legs of the URDF are not those of this robot: by them it walks {:.2f} times as far as by the LiDAR", scale);
+    f.remedy = "robot.urdf, or names, signs and zeros of the joints in the messages";
+  }
+  find(std::move(f));
 }
 
 // A zero that is wrong in both legs alike is a turn of the IMU, and counted as one: its standard deviation says so.

@@ -107,7 +107,7 @@ Fit robust_fit(const ResidualFunction& residuals, const Eigen::VectorXd& start, 
       const Eigen::MatrixXd prior_meat = s2 * s2 * Eigen::MatrixXd(prior.asDiagonal());
       out.cov = inverse * prior_meat * inverse + jackknife(blocks, H);
       // Sherman and Morrison: x without the prior p of one of it is x / (1 - p (H^-1)_ii) there.
-      out.without_prior = (1 - s2 * prior.array() * inverse.diagonal().array()).inverse();
+      out.growth_without_prior = (1 - s2 * prior.array() * inverse.diagonal().array()).inverse();
       out.good = out.x.allFinite() && out.cov.allFinite();
       break;
     }

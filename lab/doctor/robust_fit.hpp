@@ -25,10 +25,10 @@ struct Residuals {
 struct Fit {
   bool good = false;  // enough rows, a solution within its steps
   Eigen::VectorXd x;
-  Eigen::MatrixXd cov;            // of x, from the scatter of the blocks
-  Eigen::VectorXd without_prior;  // factor by which each of x, and its standard deviation, would grow if it alone had no prior
-  double scale = 0;               // robust standard deviation of one row
-  double cost = 0;                // mean of log(1 + |r|^2 / s^2) at the scale that was given, for comparisons
+  Eigen::MatrixXd cov;                   // of x, from the scatter of the blocks
+  Eigen::VectorXd growth_without_prior;  // factor by which each of x, and its standard deviation, would grow if it alone had no prior
+  double scale = 0;                      // robust standard deviation of one row
+  double cost = 0;                       // mean of log(1 + |r|^2 / s^2) at the scale that was given, for comparisons
   std::size_t groups = 0;
   double sigma(int i) const;
 };

@@ -52,7 +52,7 @@ StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesi
     out.joints.push_back(legs.recorded().joint_names[stances.joints()[j]]);
     out.zero.push_back(x[i]);
     out.zero_sigma.push_back(fit.sigma(static_cast<int>(i)));
-    out.zero_alone.push_back(fit.without_prior[i]);
+    out.zero_growth.push_back(fit.growth_without_prior[i]);
   }
   out.moved = fit.scale * Stances::unit_p;
   out.stances = stances.stances();

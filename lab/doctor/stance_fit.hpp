@@ -24,7 +24,7 @@ struct StanceFit {
                   apart_sigma = apart;   // m, link's frame: of the left foot; the right one's is its negative
   std::vector<std::string> joints;       // those that move a foot
   std::vector<double> zero, zero_sigma;  // rad, by joint: to be added to its position
-  std::vector<double> zero_alone;        // factor by which both would grow if this zero alone might be anything
+  std::vector<double> zero_growth;       // factor by which both would grow if this zero alone might be anything
   double moved = 0;                      // m: how far a standing foot seems to move, robust standard deviation
   std::size_t stances = 0;
 };
