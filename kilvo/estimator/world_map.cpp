@@ -4,6 +4,7 @@ namespace kilvo {
 
 void WorldMap::give(VoxelMap map) {
   surfaces_ = std::move(map);
+  surfaces_.settle();
   is_given_ = true;
 }
 

@@ -22,6 +22,7 @@ struct Degeneracy {
   PoseCovariance directions = PoseCovariance::Zero();  // unit vectors, scaled (rotation * lever, position), in columns: the weak ones first
   std::array<PoseCovariance, 6> doubt;                 // of where each weak one points, rad^2
   std::array<double, 6> real{}, kept{};                // 1/m^2, along each: without the faked; of it what the sweeps before have as well
+  std::array<double, 6> taken{};                       // of project_out() in the last evaluation
   int weak_count = 0;
   double lever = 1;           // m per rad
   double position = 0;        // information on all three of position, 1/m^2

@@ -100,6 +100,7 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
   if (is_blind_somewhere()) config.weak_share *= to_leave;
   LidarModel model(map, out.clusters, mount_.T_imu_lidar.p, context.map_error + out.considered, config, workers_, &blind_);
   if (context.alone) model.keep_weak();
+  model.doubt_new_surfaces(2 * to_seconds(context.end - prior.t));
   if (map.empty()) {
     out.carries = true;
   } else {

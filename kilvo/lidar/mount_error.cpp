@@ -8,13 +8,11 @@
 namespace kilvo {
 namespace {
 
-constexpr double degree = M_PI / 180;
 constexpr Duration window = std::chrono::milliseconds(250);  // longer is noisier by the gyro, shorter by the sweeps
 constexpr double fewest_windows = 10;
-constexpr double outlier = 3;                 // standard deviations, from which on a window counts less
-constexpr double best_mount = 0.02 * degree;  // no description is more exact
-constexpr double worst_mount = 3 * degree;    // worse ones are found by other means
-constexpr double arm = 1;                     // m: what tilts a bracket by an angle moves its end by the angle times a length like this
+constexpr double outlier = 3;                       // standard deviations, from which on a window counts less
+constexpr double best_mount = 0.02 * (M_PI / 180);  // no description is more exact
+constexpr double worst_mount = 3 * (M_PI / 180);    // worse ones are found by other means
 
 /// Of elements that are measured with the given noise variances and come from a normal distribution of mean zero: the expected standard
 /// deviation of that. Beforehand each order of magnitude between the best and the worst mount is as likely as any other.
@@ -78,7 +76,7 @@ PoseCovariance MountError::at(const SE3& T_WI) const {
   J.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() - R.transpose() * R0;
   J.bottomLeftCorner<3, 3>() = R0 * skew(R0.transpose() * (T_WI.p - first_.p));
   J.topRightCorner<3, 3>().setZero();
-  J.bottomRightCorner<3, 3>() = arm * (R - R0);
+  J.bottomRightCorner<3, 3>() = R - R0;  // what tilts a bracket by an angle moves its end by the angle times a length of a metre
   return sigma_ * sigma_ * J * J.transpose();
 }
 

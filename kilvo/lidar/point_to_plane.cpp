@@ -19,6 +19,9 @@ constexpr double robust_cost = 1.0094;
 // The thickness test needs a few points to say anything.
 constexpr float thickness_min_count = 4;
 
+// m/s, of what moves, along its normal: people who walk.
+constexpr double moving_speed = 0.5;
+
 // Points looked up at once.
 constexpr std::size_t at_once = 256;
 
@@ -62,6 +65,15 @@ bool LidarModel::is_behind(const VoxelMap::Match& match, const Iterate& at) cons
   return row.r * row.r > config_.gate * config_.gate * (plane.variance_at(at.lidar_W) + row.J.dot(at.P * row.J));
 }
 
+// How far a surface has moved since the mean of its points was measured: it is less likely to move the longer it has been in one leaf.
+void LidarModel::doubt_new_surfaces(double interval) {
+  const double in_leaf = map_.leaf_size() / moving_speed, longest = 30 * in_leaf;  // s
+  for (double age = interval; interval > 0 && age < longest; age += interval) {
+    const double moved = 0.5 * moving_speed * age * std::exp(-0.5 * age / in_leaf);
+    moved_variance_.push_back(moved * moved);
+  }
+}
+
 bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluster, const Iterate& at, Association& out) const {
   const Plane& plane = *match.plane;
   const Eigen::Vector3d p_I = cluster.mean.cast<double>();
@@ -86,6 +98,7 @@ bool LidarModel::accept(const VoxelMap::Match& match, const PointCluster& cluste
   out.epoch = match.epoch;
   out.variance = variance;
   out.plane_variance = plane_variance;
+  out.moved_variance = match.age - 1 < moved_variance_.size() ? moved_variance_[match.age - 1] : 0;
   out.row = row;
   out.n_I = n_I;
   return true;
@@ -154,39 +167,18 @@ void LidarModel::count_rows_of_planes() {
   }
 }
 
-// Rows of a block on their way into the sums.
-struct Waiting {
-  std::array<OuterRow, at_once> rows;
-  std::array<OuterRow, 2 * at_once> fake;
-  std::size_t row_count = 0, fake_count = 0;
-};
-
 struct LidarModel::Sums {
   PoseCovariance A = PoseCovariance::Zero();  // lower triangles
   PoseCovariance fake = PoseCovariance::Zero();
+  PoseCovariance doubted = PoseCovariance::Zero();  // of A, what is not there if new surfaces may move
   Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero();
   double chi2 = 0;
   int rows = 0;
-  Waiting* waiting = nullptr;
-
-  // Of one block, when all its rows are there.
-  void add_up() {
-    OuterSum all, faked;
-    all.add(waiting->rows.data(), waiting->row_count);
-    faked.add(waiting->fake.data(), waiting->fake_count);
-    A = all.lower();
-    fake = faked.lower();
-    for (const OuterRow& row : std::span(waiting->rows).first(waiting->row_count)) {
-      for (std::size_t k = 0; k < 6; ++k) b[static_cast<Eigen::Index>(k)] += row.w * row.r * row.g[k];
-      chi2 += row.w * row.r * row.r;
-    }
-    rows = static_cast<int>(waiting->row_count);
-    waiting = nullptr;
-  }
 
   Sums& operator+=(const Sums& o) {
     A += o.A;
     fake += o.fake;
+    doubted += o.doubted;
     b += o.b;
     chi2 += o.chi2;
     rows += o.rows;
@@ -194,24 +186,67 @@ struct LidarModel::Sums {
   }
 };
 
-void LidarModel::add_row(std::size_t i, const SE3& T_WI, Sums& sums) {
+// Rows of a block on their way into the sums.
+struct LidarModel::Waiting {
+  std::array<OuterRow, at_once> rows, doubted;
+  std::array<OuterRow, 2 * at_once> fake;
+  std::size_t row_count = 0, doubted_count = 0, fake_count = 0;
+
+  Sums added_up() const {
+    const auto sum_of = [](const auto& some, std::size_t count) {
+      OuterSum sum;
+      sum.add(some.data(), count);
+      return sum.lower();
+    };
+    Sums out{sum_of(rows, row_count), sum_of(fake, fake_count), sum_of(doubted, doubted_count)};
+    for (const OuterRow& row : std::span(rows).first(row_count)) {
+      for (std::size_t k = 0; k < 6; ++k) out.b[static_cast<Eigen::Index>(k)] += row.w * row.r * row.g[k];
+      out.chi2 += row.w * row.r * row.r;
+    }
+    out.rows = static_cast<int>(row_count);
+    return out;
+  }
+};
+
+void LidarModel::add_row(std::size_t i, const SE3& T_WI, Waiting& waiting) {
   Association& a = associations_[i];
   if (a.plane == nullptr) return;
-  Waiting& waiting = *sums.waiting;
   // k rows of one plane share its error: each carries k times its variance, so that together they average it not at all.
-  const double variance = a.variance + rows_of_plane_[a.shared] * a.plane_variance;
-  const double z = std::abs(a.row.r) / std::sqrt(a.variance + a.plane_variance);
-  a.weight = (z > robust_sigmas ? robust_sigmas / z : 1.0) / (robust_cost * variance);
+  const double in_common = rows_of_plane_[a.shared];
+  const auto weight_with = [&](double plane_variance) {
+    const double z = std::abs(a.row.r) / std::sqrt(a.variance + plane_variance);
+    return (z > robust_sigmas ? robust_sigmas / z : 1.0) / (robust_cost * (a.variance + in_common * plane_variance));
+  };
+  a.weight = weight_with(a.plane_variance + (report_.doubts_new ? a.moved_variance : 0));
   waiting.rows[waiting.row_count++] = {a.row.J, a.weight, a.row.r};
   if (!first_) return;
+  const double sure = a.moved_variance > 0 ? weight_with(a.plane_variance + a.moved_variance) : a.weight;
+  if (sure < a.weight) waiting.doubted[waiting.doubted_count++] = {a.row.J, a.weight - sure};
   const Eigen::Vector3d p_I = clusters_[i].mean.cast<double>();
   const Eigen::Vector3f other_axis = a.plane->normal.cross(a.plane->axis);
   for (const auto& [axis, tilt] : {std::pair(a.plane->axis, a.plane->tilt_variance_1), std::pair(other_axis, a.plane->tilt_variance_2)}) {
     Eigen::Matrix<double, 6, 1> g;
     g.tail<3>() = axis.cast<double>();
     g.head<3>() = p_I.cross(T_WI.R.matrix().transpose() * g.tail<3>());
-    waiting.fake[waiting.fake_count++] = {g, a.weight * static_cast<double>(tilt)};
+    waiting.fake[waiting.fake_count++] = {g, sure * static_cast<double>(tilt)};
   }
+}
+
+// Whether new surfaces measure much of the direction that the settled ones measure least, and not as much of all directions.
+bool LidarModel::only_new_measures_one(const Sums& sums) {
+  constexpr double much = 0.3;
+  const Eigen::Matrix3d all = PoseCovariance(sums.A.selfadjointView<Eigen::Lower>()).bottomRightCorner<3, 3>(),
+                        fresh = PoseCovariance(sums.doubted.selfadjointView<Eigen::Lower>()).bottomRightCorner<3, 3>();
+  const Eigen::Vector3d u = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(Eigen::Matrix3d(all - fresh)).eigenvectors().col(0);
+  return u.dot(fresh * u) > much * u.dot(all * u) && fresh.trace() < 0.5 * all.trace();
+}
+
+LidarModel::Sums LidarModel::sum_rows(const SE3& T_WI) {
+  return workers_.sum(associations_.size(), at_once, Sums{}, [&](std::size_t first, std::size_t last) {
+    Waiting waiting;
+    for (std::size_t i = first; i < last; ++i) add_row(i, T_WI, waiting);
+    return waiting.added_up();
+  });
 }
 
 Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
@@ -225,14 +260,15 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
     return rejected;
   });
   count_rows_of_planes();
-  Sums sums = workers_.sum(associations_.size(), at_once, Sums{}, [&](std::size_t first, std::size_t last) {
-    Waiting waiting;
-    Sums part;
-    part.waiting = &waiting;
-    for (std::size_t i = first; i < last; ++i) add_row(i, T_WI, part);
-    part.add_up();
-    return part;
-  });
+  Sums sums = sum_rows(T_WI);
+  if (first_) {
+    report_.information = {(sums.A - sums.doubted).selfadjointView<Eigen::Lower>(), sums.fake.selfadjointView<Eigen::Lower>(),
+                           static_cast<int>(rows_of_plane_.size()), T_WI.R.matrix()};
+    report_.degeneracy = find_degeneracy(report_.information, config_.weak_share, blind_ != nullptr ? *blind_ : BlindDirections{});
+    first_ = false;
+    report_.doubts_new = report_.degeneracy.weak_count > 0 || only_new_measures_one(sums);
+    if (report_.doubts_new) sums = sum_rows(T_WI);
+  }
   Information<6> info;
   info.columns = {at::R, at::R + 1, at::R + 2, at::p, at::p + 1, at::p + 2};
   info.A = sums.A.selfadjointView<Eigen::Lower>();
@@ -241,12 +277,7 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   info.rows = sums.rows;
   report_.matched = info.rows;
   report_.chi2_per_row = info.rows > 0 ? info.chi2 / info.rows : 0;
-  if (first_) {
-    report_.information = {info.A, sums.fake.selfadjointView<Eigen::Lower>(), static_cast<int>(rows_of_plane_.size()), T_WI.R.matrix()};
-    report_.degeneracy = find_degeneracy(report_.information, config_.weak_share, blind_ != nullptr ? *blind_ : BlindDirections{});
-  }
-  first_ = false;
-  taken_ = project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), keeps_weak_, info);
+  report_.degeneracy.taken = project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), keeps_weak_, info);
   return info;
 }
 

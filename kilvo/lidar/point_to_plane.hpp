@@ -27,6 +27,7 @@ struct RegistrationReport {
   int matched = 0;   // rows used
   int rejected = 0;  // had a plane but failed the gate
   double chi2_per_row = 0;
+  bool doubts_new = false;       // surfaces that are new may move
   SweepInformation information;  // of the first evaluation
   Degeneracy degeneracy;
 };
@@ -41,6 +42,9 @@ class LidarModel {
 
   /// Nothing else measures what the sweep hardly holds: what of it is not faked is kept.
   void keep_weak() { keeps_weak_ = true; }
+  /// Sweeps come at this interval (s): what a voxel was first seen to hold a moment ago may be a person who walks, and says little of a
+  /// direction that only such surfaces measure.
+  void doubt_new_surfaces(double interval);
   Information<6> operator()(const State& x, const Covariance& prior);
 
   const RegistrationReport& report() const { return report_; }
@@ -61,11 +65,13 @@ class LidarModel {
     double weight = 0;          // 1/m^2, of the last evaluation
     double variance = 0;        // of the cluster's mean along the normal: measurement and roughness, m^2
     double plane_variance = 0;  // of the plane under it, common to all clusters of the plane, m^2
+    double moved_variance = 0;  // the same, were it a surface that moves, m^2
     PointToPlaneRow row;
     Eigen::Vector3d n_I = Eigen::Vector3d::Zero();  // normal of the plane
   };
 
   struct Sums;
+  struct Waiting;
   // Where a cluster fell the last time, and what was there.
   struct Place {
     VoxelKey leaf = 0;
@@ -82,7 +88,9 @@ class LidarModel {
   void count_rows_of_planes();
   bool is_behind(const VoxelMap::Match& match, const Iterate& at) const;
   bool accept(const VoxelMap::Match& match, const PointCluster& cluster, const Iterate& at, Association& out) const;
-  void add_row(std::size_t i, const SE3& T_WI, Sums& sums);
+  void add_row(std::size_t i, const SE3& T_WI, Waiting& waiting);
+  Sums sum_rows(const SE3& T_WI);
+  static bool only_new_measures_one(const Sums& sums);
 
   const VoxelMap& map_;
   std::span<const PointCluster> clusters_;
@@ -96,7 +104,7 @@ class LidarModel {
   std::vector<std::uint16_t> rows_of_plane_;  // of the last evaluation
   const BlindDirections* blind_;
   bool first_ = true, keeps_weak_ = false;
-  std::array<double, 6> taken_{};  // project_out() of the last evaluation
+  std::vector<double> moved_variance_;  // m^2, of surfaces that were first seen one, two, ... sweeps ago
   RegistrationReport report_;
 };
 

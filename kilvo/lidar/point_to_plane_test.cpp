@@ -230,6 +230,60 @@ TEST(LidarModel, TheInformationByEpochAddsUpToAll) {
   EXPECT_LT((sum - info.A).norm(), 1e-9 * info.A.norm());
 }
 
+// A corridor along x that has been there for long, and in it a board across: as it was a moment ago, and 6 cm nearer now.
+struct CorridorWithABoard {
+  static std::vector<Eigen::Vector3d> board(double x) {
+    std::vector<Eigen::Vector3d> out;
+    for (double y = -0.8; y < 0.8; y += 0.03) {
+      for (double z = -0.7; z < 0.7; z += 0.03) out.emplace_back(x, y, z);
+    }
+    return out;
+  }
+
+  explicit CorridorWithABoard(bool is_new) {
+    std::vector<Eigen::Vector3d> walls;
+    for (double x = -3; x < 3; x += 0.05) {
+      for (double s = -0.9; s < 0.9; s += 0.05) {
+        for (const double side : {-1.2, 1.2}) walls.emplace_back(x, side, s), walls.emplace_back(x, s, side);
+      }
+    }
+    add(walls);
+    map.settle();
+    add(board(3.1));
+    if (!is_new) map.settle();
+    map.see_through({}, {});  // the next sweep
+    for (const auto& points : {walls, board(3.04)}) {
+      for (const Eigen::Vector3d& x : points) scan.emplace_back(x.cast<float>().x(), x.cast<float>().y(), x.cast<float>().z(), 0.0F);
+    }
+  }
+
+  double moved_along_it() const {
+    const auto clusters = downsample(scan, SE3{}, LidarConfig{}.voxel_size);
+    const Workers workers(1);
+    Estimate prior;
+    prior.P.diagonal().setConstant(1e-4);
+    prior.P(at::p, at::p) = 0.03 * 0.03;
+    LidarModel model(map, clusters, Eigen::Vector3d::Zero(), PoseCovariance::Zero(), {}, workers);
+    model.doubt_new_surfaces(0.1);
+    return update(prior, model, UpdateConfig{}).posterior.x.p.x();
+  }
+
+  VoxelMap map{MapConfig{}};
+  std::vector<PointXYZI> scan;
+
+ private:
+  void add(const std::vector<Eigen::Vector3d>& points) {
+    std::vector<PointGroup> groups;
+    for (const Eigen::Vector3d& x : points) groups.push_back({x, Eigen::Matrix3d::Zero(), 1e-4 * Eigen::Matrix3d::Identity(), 1});
+    map.insert(groups, 0, Eigen::Vector3d(0, 0, 0));
+  }
+};
+
+TEST(LidarModel, AlongACorridorANewSurfaceMayBeAPersonWhoWalks) {
+  EXPECT_GT(CorridorWithABoard(false).moved_along_it(), 0.05);
+  EXPECT_LT(CorridorWithABoard(true).moved_along_it(), 0.02);
+}
+
 TEST(ToWorld, GroupsAreTheClustersSeenFromTheWorld) {
   test::Random random(5);
   std::vector<PointCluster> clusters(7);  // four together, and three

@@ -72,7 +72,7 @@ std::vector<EpochInformation> LidarModel::by_epoch() const {
   for (EpochInformation& e : out) {
     if (keeps_weak_) {
       std::array<double, 6> share = along_weak(d, e.A);
-      for (std::size_t k = 0; k < share.size(); ++k) share[k] = of_all[k] > 0 ? taken_[k] * share[k] / of_all[k] : 0;
+      for (std::size_t k = 0; k < share.size(); ++k) share[k] = of_all[k] > 0 ? d.taken[k] * share[k] / of_all[k] : 0;
       e.kept = weak_part(d, share);
     }
     e.A = (known.transpose() * e.A * known).eval();

@@ -89,7 +89,7 @@ void VoxelMap::first_planes(std::span<const Eigen::Vector3d> points, std::span<M
     }
     walk_in_step<0>({leaves.data(), count}, [&](std::size_t i, std::uint32_t index) {
       const Node& node = nodes_[index];
-      if (node.is_plane) out[first + i] = {&node.plane, index, node.epoch, node.one_sided};
+      if (node.is_plane) out[first + i] = {&node.plane, index, node.epoch, sweep_ - node.born, node.one_sided};
       return node.is_plane;
     });
   }
@@ -103,8 +103,8 @@ bool VoxelMap::explains(const Plane& plane, const PointGroup& group) {
 // A plane keeps its side: that of the first fit that is certain of it.
 void VoxelMap::refit_if_due(Node& node, const Eigen::Vector3d& origin, const std::optional<Eigen::Vector3d>& seen_from) {
   const double n = node.moments.count();
-  if (n < config_.min_points || n < refit_growth * node.fitted_count) return;
-  node.fitted_count = n;
+  if (n < config_.min_points || n < refit_growth * static_cast<double>(node.fitted_count)) return;
+  node.fitted_count = static_cast<float>(n);
   auto plane = fit_plane(node.moments, origin, config_.min_points, config_.max_roughness);
   if (plane) {
     const bool had_side = node.is_plane && node.one_sided;
@@ -160,7 +160,7 @@ void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32
     Node& node = nodes_[index];
     const bool settled = is_settled(node);
     if (node.against > 0 && node.is_plane && explains(node.plane, group)) node.against = 0;
-    if (node.moments.count() == 0) node.epoch = insertion.epoch;
+    if (node.moments.count() == 0) node.epoch = insertion.epoch, node.born = sweep_;
     if (settled && explains(node.plane, group)) return;
     if (!settled) {
       node.moments.add(group, origin);

@@ -45,6 +45,7 @@ class VoxelMap {
     const Plane* plane = nullptr;
     std::uint32_t node = 0;
     std::uint32_t epoch = 0;  // of the insertion that began the node
+    std::uint32_t age = 0;    // sweeps since points first were there
     bool one_sided = false;   // the surface was seen from the side that the normal points to, from the other one it is another surface
   };
 
@@ -67,6 +68,9 @@ class VoxelMap {
   /// The beams from `origin_W` to these `ends` (to some of them, others each time) met nothing before: a plane that beams
   /// keep passing through, and that no group is found on meanwhile, is not there any more and is forgotten with its points.
   void see_through(const Eigen::Vector3d& origin_W, std::span<const Eigen::Vector3d> ends);
+
+  /// What the map holds has been there for long.
+  void settle() { sweep_ += 1000; }
 
   /// Forgets voxels beyond the radius around `centre`, and the farthest ones while there are more than max_nodes.
   void forget(const Eigen::Vector3d& centre);
@@ -96,7 +100,8 @@ class VoxelMap {
     std::uint32_t epoch = 0;
     std::uint32_t children = no_index;  // index of its table of eight; none for leaves and undivided nodes
     std::uint32_t passed_in = 0;        // the last of those sweeps
-    double fitted_count = 0;            // points at the last fit
+    float fitted_count = 0;             // points at the last fit
+    std::uint32_t born = 0;             // sweep of its first points
     Moments moments;
   };
   static_assert(sizeof(Plane) == 64 && sizeof(Node) == 192);
@@ -169,7 +174,7 @@ bool VoxelMap::visit_planes(const Eigen::Vector3d& x, F&& f) const {
   std::uint32_t index = roots_.find(root_key(leaf));
   for (int level = 0; index != no_index; ++level) {
     const Node& node = nodes_[index];
-    if (node.is_plane && f(Match{&node.plane, index, node.epoch, node.one_sided})) return true;
+    if (node.is_plane && f(Match{&node.plane, index, node.epoch, sweep_ - node.born, node.one_sided})) return true;
     if (node.children == no_index) return false;
     index = children_[node.children][octant(leaf, level)];
   }
