@@ -70,7 +70,7 @@ void LidarModel::doubt_new_surfaces(double interval) {
   const double in_leaf = map_.leaf_size() / moving_speed, longest = 30 * in_leaf;  // s
   for (double age = interval; interval > 0 && age < longest; age += interval) {
     const double moved = 0.5 * moving_speed * age * std::exp(-0.5 * age / in_leaf);
-    moved_variance_.push_back(moved * moved);
+    moved_variance_.push_back(map_.moving_share() * moved * moved);
   }
 }
 

@@ -38,6 +38,8 @@ bool passes(const Plane& plane, const Eigen::Vector3d& from, const Eigen::Vector
 
 void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const Eigen::Vector3d> ends) {
   ++sweep_;
+  // Two that were gone soon are no chance. Until then, the longer there was none the less likely it is.
+  moving_share_ = gone_soon_ > 1 ? 1 : moving_share_ * std::exp(-1.0 / long_ago);
   if (ends.empty()) return;
   const std::size_t count = ends.size(), stride = std::max<std::size_t>(1, count / most_beams);
   const std::size_t first =
@@ -117,6 +119,7 @@ bool VoxelMap::is_passed(std::uint32_t root, const Leaf& leaf, const Eigen::Vect
 // The voxels above lose its points as well: what they hold is what their other children hold.
 void VoxelMap::forget_plane(const Path& path, int level, const Eigen::Vector3d& origin) {
   Node& gone_one = nodes_[path[static_cast<std::size_t>(level)]];
+  if (sweep_ - gone_one.born < 4 * gone) ++gone_soon_;
   free_children(gone_one);
   gone_one = Node{};
   for (int above = level - 1; above >= 0; --above) {

@@ -69,6 +69,9 @@ class VoxelMap {
   /// keep passing through, and that no group is found on meanwhile, is not there any more and is forgotten with its points.
   void see_through(const Eigen::Vector3d& origin_W, std::span<const Eigen::Vector3d> ends);
 
+  /// How likely a new surface moves, by those that beams passed through soon after their first points: 0 to 1.
+  double moving_share() const { return moving_share_; }
+
   /// What the map holds has been there for long.
   void settle() { sweep_ += 1000; }
 
@@ -162,7 +165,9 @@ class VoxelMap {
   Pool<Node> nodes_;
   Pool<Children> children_;
   std::size_t node_count_ = 0;
-  std::uint32_t sweep_ = 1000;            // counts the calls of see_through()
+  std::uint32_t sweep_ = 1000;   // counts the calls of see_through()
+  std::uint32_t gone_soon_ = 0;  // planes
+  double moving_share_ = 1;
   std::uint32_t passed_last_ = 0;         // when a beam last passed through a plane
   std::vector<std::uint32_t> passed_in_;  // the same by direction
   Eigen::Vector3d last_forget_ = Eigen::Vector3d::Zero();
