@@ -266,7 +266,7 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
                            static_cast<int>(rows_of_plane_.size()), T_WI.R.matrix()};
     report_.degeneracy = find_degeneracy(report_.information, config_.weak_share, blind_ != nullptr ? *blind_ : BlindDirections{});
     first_ = false;
-    report_.doubts_new = report_.degeneracy.weak_count > 0 || only_new_measures_one(sums);
+    report_.doubts_new = !sums.doubted.isZero(0) && (report_.degeneracy.weak_count > 0 || only_new_measures_one(sums));
     if (report_.doubts_new) sums = sum_rows(T_WI);
   }
   Information<6> info;

@@ -38,7 +38,7 @@ bool passes(const Plane& plane, const Eigen::Vector3d& from, const Eigen::Vector
 
 void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const Eigen::Vector3d> ends) {
   ++sweep_;
-  // Two that were gone soon are no chance. Until then, the longer there was none the less likely it is.
+  // Two planes that were gone soon after their first points are no chance. Until then, the longer there were none the less likely it is.
   moving_share_ = gone_soon_ > 1 ? 1 : moving_share_ * std::exp(-1.0 / long_ago);
   if (ends.empty()) return;
   const std::size_t count = ends.size(), stride = std::max<std::size_t>(1, count / most_beams);
