@@ -40,13 +40,14 @@ struct Measured {
   std::vector<lab::Refinement> refinements;
 };
 
-// So many seconds of the recording after `from`, or after its beginning, and all before, held against these settings.
+// So many seconds of the recording after `from`, or after its beginning, and all before, held against these settings. `exact`: all points
+// of the LiDAR.
 Measured measured(std::optional<Time> from, double seconds, const RunOptions& options, const lab::Settings& settings,
-                  const std::vector<Sensor>& used) {
+                  const std::vector<Sensor>& used, bool exact) {
   const lab::RecordingOptions wanted = recording_options(options, settings, used);
   lab::RecordingSource source({options.inputs.begin(), options.inputs.end()}, wanted);
   lab::FailingSource failing(source, options.failures, source.begin(), [&source] { return source.recorded(); });
-  lab::Recorder recorder(wanted.leg_clock.has_value());
+  lab::Recorder recorder(wanted.leg_clock.has_value(), exact);
   while (const auto measurement = failing.next()) {
     if (to_seconds(stamp_of(*measurement) - from.value_or(source.begin())) > seconds) break;
     recorder.push(*measurement);
@@ -59,7 +60,7 @@ Measured measured(std::optional<Time> from, double seconds, const RunOptions& op
 
 Measured measured_after(const WrongDescription& first, const RunOptions& options, const lab::Settings& settings, std::vector<Sensor> used) {
   std::erase(used, Sensor::camera);
-  return measured(first.t, measured_for, options, settings, used);
+  return measured(first.t, measured_for, options, settings, used, false);
 }
 
 void put_taken(std::vector<lab::Change>& changes, const std::vector<lab::Refinement>& refinements) {
@@ -78,7 +79,7 @@ KnownDescription refined(const lab::Settings& settings, const RunOptions& option
   constexpr int most_rounds = 3;
   KnownDescription known;
   for (int round = 0; round < most_rounds; ++round) {
-    const Measured now = measured(std::nullopt, refined_by, options, mended(known, options, config), used);
+    const Measured now = measured(std::nullopt, refined_by, options, mended(known, options, config), used, true);
     if (now.diagnosis.good()) {
       put_taken(known.refined, now.refinements);
       return known;

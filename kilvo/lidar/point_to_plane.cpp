@@ -67,8 +67,11 @@ bool LidarModel::is_behind(const VoxelMap::Match& match, const Iterate& at) cons
 
 // How far a surface has moved since the mean of its points was measured: it is less likely to move the longer it has been in one leaf.
 void LidarModel::doubt_new_surfaces(double interval) {
+  if (!(interval > 0 && map_.moving_share() > 0)) return;
+  interval = std::max(interval, 1e-3);                                             // of sweeps whose points' times are next to none
   const double in_leaf = map_.leaf_size() / moving_speed, longest = 30 * in_leaf;  // s
-  for (double age = interval; interval > 0 && age < longest; age += interval) {
+  moved_variance_.reserve(static_cast<std::size_t>(longest / interval) + 1);
+  for (double age = interval; age < longest; age += interval) {
     const double moved = 0.5 * moving_speed * age * std::exp(-0.5 * age / in_leaf);
     moved_variance_.push_back(map_.moving_share() * moved * moved);
   }
