@@ -68,7 +68,6 @@ bool LidarModel::is_behind(const VoxelMap::Match& match, const Iterate& at) cons
 // How far a surface has moved since the mean of its points was measured: it is less likely to move the longer it has been in one leaf.
 void LidarModel::doubt_new_surfaces(double interval) {
   if (!(interval > 0 && map_.moving_share() > 0)) return;
-  interval = std::max(interval, 1e-3);                                             // of sweeps whose points' times are next to none
   const double in_leaf = map_.leaf_size() / moving_speed, longest = 30 * in_leaf;  // s
   moved_variance_.reserve(static_cast<std::size_t>(longest / interval) + 1);
   for (double age = interval; age < longest; age += interval) {
