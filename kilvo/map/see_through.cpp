@@ -38,8 +38,9 @@ bool passes(const Plane& plane, const Eigen::Vector3d& from, const Eigen::Vector
 
 void VoxelMap::see_through(const Eigen::Vector3d& origin_W, std::span<const Eigen::Vector3d> ends) {
   ++sweep_;
-  // Two planes that were gone soon after their first points are no chance. Until then, the longer there were none the less likely it is.
+  // Two planes in a minute that were gone soon after their first points are no chance; else it is less likely the longer there were none.
   moving_share_ = gone_soon_ > 1 ? 1 : moving_share_ * std::exp(-1.0 / long_ago);
+  gone_soon_ *= std::exp(-0.1 / long_ago);
   if (ends.empty()) return;
   const std::size_t count = ends.size(), stride = std::max<std::size_t>(1, count / most_beams);
   const std::size_t first =
@@ -119,7 +120,7 @@ bool VoxelMap::is_passed(std::uint32_t root, const Leaf& leaf, const Eigen::Vect
 // The voxels above lose its points as well: what they hold is what their other children hold.
 void VoxelMap::forget_plane(const Path& path, int level, const Eigen::Vector3d& origin) {
   Node& gone_one = nodes_[path[static_cast<std::size_t>(level)]];
-  if (sweep_ - gone_one.born < 4 * gone) ++gone_soon_;
+  if (sweep_ - gone_one.born < 4 * gone) gone_soon_ += 1;
   free_children(gone_one);
   gone_one = Node{};
   for (int above = level - 1; above >= 0; --above) {

@@ -291,6 +291,26 @@ TEST(VoxelMap, ABoxThatIsGoneIsForgottenAfterTwoSecondsOfBeamsThroughIt) {
   EXPECT_NE(seen.map.plane_at({6, 0.3, 0.3}), nullptr);
 }
 
+TEST(VoxelMap, ThatSurfacesMoveIsSeenByThoseThatAreGoneSoonAndIsForgotten) {
+  SeenThrough seen;
+  const auto sweeps = [&](int count, bool with_box) {
+    for (int i = 0; i < count; ++i) seen.sweep(SeenThrough::scene(with_box));
+    return seen.map.moving_share();
+  };
+  const auto nothing_new = [&](int count) {
+    for (int i = 0; i < count; ++i) seen.map.see_through({}, {});
+    return seen.map.moving_share();
+  };
+  EXPECT_EQ(seen.map.moving_share(), 1);
+  sweeps(2, false);
+  EXPECT_LT(nothing_new(200), 0.03);
+  sweeps(30, true);
+  EXPECT_LT(sweeps(20, false), 0.03) << "a box that stood for 3 s";
+  sweeps(8, true);
+  EXPECT_EQ(sweeps(12, false), 1) << "one that stood for 0.8 s";
+  EXPECT_LT(nothing_new(3000), 0.03) << "five minutes later";
+}
+
 TEST(VoxelMap, AWallAroundAHoleStays) {
   SeenThrough seen;
   for (int i = 0; i < 100; ++i) seen.sweep(SeenThrough::scene(false));
