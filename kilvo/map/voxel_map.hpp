@@ -166,7 +166,7 @@ class VoxelMap {
   Pool<Children> children_;
   std::size_t node_count_ = 0;
   std::uint32_t sweep_ = 1000;               // counts the calls of see_through()
-  double gone_soon_ = 0, moving_share_ = 1;  // planes of the last minute; -
+  double gone_soon_ = 0, moving_share_ = 1;  // planes of about a minute, which fade; 0 to 1
   std::uint32_t passed_last_ = 0;            // when a beam last passed through a plane
   std::vector<std::uint32_t> passed_in_;     // the same by direction
   Eigen::Vector3d last_forget_ = Eigen::Vector3d::Zero();
