@@ -86,6 +86,13 @@ Matrix6 BlindDirections::mean_with(const SweepInformation& sweep) const {
   return (sweeps_ * rotated(sweep.R_WI).transpose() * mean_ * rotated(sweep.R_WI) + own) / (sweeps_ + 1);
 }
 
+double BlindDirections::confirmed_with(double share) const {
+  constexpr double sure2 = 9;  // three standard deviations, squared
+  const int sweeps = sweeps_ + 1;
+  const double mean = mean_share_with(share), noise = share_.variance() * alike / sweeps;
+  return sweeps > alike && mean > 0 ? std::max(0.0, 1 - sure2 * noise / (mean * mean)) : 0;
+}
+
 Degeneracy find_degeneracy(const SweepInformation& sweep, double weak_share, const BlindDirections& before) {
   if (!(sweep.A.topLeftCorner<3, 3>().trace() > 0) || !(sweep.A.bottomRightCorner<3, 3>().trace() > 0)) return {};
   Degeneracy out = decompose(sweep, sweep.A, weak_share);
@@ -123,7 +130,7 @@ std::array<double, 6> along_weak(const Degeneracy& d, const Matrix6& A) {
   return out;
 }
 
-std::array<double, 6> project_out(const Degeneracy& d, const PoseCovariance& prior, bool alone, Information<6>& info) {
+std::array<double, 6> project_out(const Degeneracy& d, const PoseCovariance& prior, double trust, Information<6>& info) {
   std::array<double, 6> taken{};
   if (d.weak_count == 0) return taken;
   const Vector6 metres = to_metres(d.lever), to_own = metres.cwiseInverse();
@@ -136,13 +143,13 @@ std::array<double, 6> project_out(const Degeneracy& d, const PoseCovariance& pri
   for (int k = 0; k < d.weak_count; ++k) {
     const Vector6 u = d.directions.col(k);
     const auto i = static_cast<std::size_t>(k);
-    if (const double whole = u.dot(A * u); alone && whole > 0) {
+    if (const double whole = u.dot(A * u); trust > 0 && whole > 0) {
       // Faked rows see no error: of all rows, b = real * error, with the noise of all.
       const double attenuation = std::min(1.0, d.kept[i] / whole);
-      const double known = d.kept[i] * attenuation / alike, variance = u.dot(P * u);
+      const double weight = trust * attenuation / alike, known = d.kept[i] * weight, variance = u.dot(P * u);
       taken[i] = known * variance / (1 + known * variance);
       kept_A += known * u * u.transpose();
-      kept_b += attenuation / alike * u.dot(b) * u;
+      kept_b += weight * u.dot(b) * u;
     }
     const Matrix6 keep = Matrix6::Identity() - u * u.transpose();
     A = (keep * A * keep).eval();

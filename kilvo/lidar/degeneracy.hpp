@@ -49,6 +49,8 @@ class BlindDirections {
     with.add(share, 1);
     return with.mean();
   }
+  /// How much of that mean is more than its scatter, 0 to 1 (James and Stein 1961).
+  double confirmed_with(double share) const;
 
  private:
   static constexpr int memory = 30;                                               // sweeps
@@ -73,8 +75,8 @@ std::array<double, 6> along_weak(const Degeneracy& degeneracy, const PoseCovaria
 
 /// Takes the weak directions out of A and b. They are known to Degeneracy::doubt, so when the prior is uncertain by metres along one of
 /// them, the others are trusted to that fraction of it and no better: else every millimetre measured across would become a decimetre
-/// along. `alone`: nothing else measures along them, and what is confirmed of them is kept, as far as it can be believed. Returns how
-/// much of each weak direction an update by this information then takes from the map (0 to 1); the rest stays as in the prior.
-std::array<double, 6> project_out(const Degeneracy& degeneracy, const PoseCovariance& prior, bool alone, Information<6>& info);
+/// along. Degeneracy::kept stays, with `trust` (0 to 1). Returns how much of each weak direction an update by this information then takes
+/// from the map (0 to 1); the rest stays as in the prior.
+std::array<double, 6> project_out(const Degeneracy& degeneracy, const PoseCovariance& prior, double trust, Information<6>& info);
 
 }  // namespace kilvo

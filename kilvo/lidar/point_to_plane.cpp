@@ -267,6 +267,7 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
     report_.information = {(sums.A - sums.doubted).selfadjointView<Eigen::Lower>(), sums.fake.selfadjointView<Eigen::Lower>(),
                            static_cast<int>(rows_of_plane_.size()), T_WI.R.matrix()};
     report_.degeneracy = find_degeneracy(report_.information, config_.weak_share, blind_ != nullptr ? *blind_ : BlindDirections{});
+    trust_ = keeps_weak_ ? 1 : blind_ != nullptr ? blind_->confirmed_with(report_.degeneracy.smallest_share) : 0;
     first_ = false;
     report_.doubts_new = !sums.doubted.isZero(0) && (report_.degeneracy.weak_count > 0 || only_new_measures_one(sums));
     if (report_.doubts_new) sums = sum_rows(T_WI);
@@ -279,7 +280,7 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   info.rows = sums.rows;
   report_.matched = info.rows;
   report_.chi2_per_row = info.rows > 0 ? info.chi2 / info.rows : 0;
-  report_.degeneracy.taken = project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), keeps_weak_, info);
+  report_.degeneracy.taken = project_out(report_.degeneracy, prior.topLeftCorner<6, 6>(), trust_, info);
   return info;
 }
 

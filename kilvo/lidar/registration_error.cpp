@@ -70,7 +70,7 @@ std::vector<EpochInformation> LidarModel::by_epoch() const {
   const PoseCovariance known = PoseCovariance::Identity() - weak_part(d);
   const std::array<double, 6> of_all = along_weak(d, all);
   for (EpochInformation& e : out) {
-    if (keeps_weak_) {
+    if (trust_ > 0) {
       std::array<double, 6> share = along_weak(d, e.A);
       for (std::size_t k = 0; k < share.size(); ++k) share[k] = of_all[k] > 0 ? d.taken[k] * share[k] / of_all[k] : 0;
       e.kept = weak_part(d, share);
