@@ -86,11 +86,9 @@ Matrix6 BlindDirections::mean_with(const SweepInformation& sweep) const {
   return (sweeps_ * rotated(sweep.R_WI).transpose() * mean_ * rotated(sweep.R_WI) + own) / (sweeps_ + 1);
 }
 
-double BlindDirections::confirmed_with(double share) const {
-  constexpr double sure2 = 9;  // three standard deviations, squared
-  const int sweeps = sweeps_ + 1;
-  const double mean = mean_share_with(share), noise = share_.variance() * alike / sweeps;
-  return sweeps > alike && mean > 0 ? std::max(0.0, 1 - sure2 * noise / (mean * mean)) : 0;
+double BlindDirections::confirmed_with(double share, double sigmas) const {
+  const double mean = mean_share_with(share), chance = sigmas * share_.sigma() * std::sqrt(alike / (sweeps_ + 1));
+  return sweeps_ >= alike && mean > chance ? 1 - chance * chance / (mean * mean) : 0;
 }
 
 Degeneracy find_degeneracy(const SweepInformation& sweep, double weak_share, const BlindDirections& before) {
@@ -110,11 +108,7 @@ Degeneracy find_degeneracy(const SweepInformation& sweep, double weak_share, con
   return out;
 }
 
-Matrix6 weak_part(const Degeneracy& d) {
-  const Vector6 metres = to_metres(d.lever);
-  return metres.cwiseInverse().asDiagonal() * (d.directions.leftCols(d.weak_count) * d.directions.leftCols(d.weak_count).transpose()) *
-         metres.asDiagonal();
-}
+Matrix6 weak_part(const Degeneracy& d) { return weak_part(d, {1, 1, 1, 1, 1, 1}); }
 
 Matrix6 weak_part(const Degeneracy& d, const std::array<double, 6>& share) {
   const Vector6 metres = to_metres(d.lever);
@@ -137,8 +131,7 @@ std::array<double, 6> project_out(const Degeneracy& d, const PoseCovariance& pri
   const Matrix6 P = metres.asDiagonal() * prior * metres.asDiagonal();
   Matrix6 A = scaled(info.A, d.lever);
   Vector6 b = to_own.asDiagonal() * info.b;
-  Matrix6 across = Matrix6::Zero();
-  Matrix6 kept_A = Matrix6::Zero();
+  Matrix6 across = Matrix6::Zero(), kept_A = across;
   Vector6 kept_b = Vector6::Zero();
   for (int k = 0; k < d.weak_count; ++k) {
     const Vector6 u = d.directions.col(k);

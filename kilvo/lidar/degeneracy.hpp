@@ -49,8 +49,8 @@ class BlindDirections {
     with.add(share, 1);
     return with.mean();
   }
-  /// How much of that mean is more than its scatter, 0 to 1 (James and Stein 1961).
-  double confirmed_with(double share) const;
+  /// How much of that mean is more than `sigmas` standard deviations of it, 0 to 1.
+  double confirmed_with(double share, double sigmas) const;
 
  private:
   static constexpr int memory = 30;                                               // sweeps

@@ -238,6 +238,25 @@ TEST(Degeneracy, AShareThatScattersAroundZeroIsNotKept) {
   EXPECT_LT(kept, 60) << "of 900 in every second sweep";
 }
 
+// Beside legs or images: 450 +- 450 in 40 sweeps that err alike in tens is chance, 450 +- 45 is not.
+TEST(Degeneracy, OnlyWhatIsMoreThanChanceIsConfirmed) {
+  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Identity() * 1e6, fake = Eigen::Matrix<double, 6, 6>::Zero();
+  fake(3, 3) = 1000;
+  const auto confirmed = [&](double scatter, int sweeps) {
+    BlindDirections blind;
+    for (int i = 0;; ++i) {
+      A(3, 3) = 2000 + 450 + (i % 2 == 0 ? scatter : -scatter);
+      const Degeneracy d = find_degeneracy({A, fake}, 0.002, blind);
+      if (i == sweeps) return blind.confirmed_with(d.smallest_share, 3);
+      blind.see({A, fake}, d);
+    }
+  };
+  EXPECT_EQ(confirmed(450, 40), 0);
+  // 1 - 3^2 * (45 / 450)^2 * 10 / 31
+  EXPECT_NEAR(confirmed(45, 40), 1 - 0.09 * 10 / 31, 0.005);
+  EXPECT_EQ(confirmed(45, 5), 0) << "few sweeps do not show their scatter";
+}
+
 TEST(Degeneracy, WithoutAnyInformationNothingBreaks) {
   const Eigen::Matrix<double, 6, 6> none = Eigen::Matrix<double, 6, 6>::Zero();
   const Degeneracy d = find_degeneracy({none, none}, 0.002, {});

@@ -263,12 +263,11 @@ Information<6> LidarModel::operator()(const State& x, const Covariance& prior) {
   });
   count_rows_of_planes();
   Sums sums = sum_rows(T_WI);
-  if (first_) {
+  if (std::exchange(first_, false)) {
     report_.information = {(sums.A - sums.doubted).selfadjointView<Eigen::Lower>(), sums.fake.selfadjointView<Eigen::Lower>(),
                            static_cast<int>(rows_of_plane_.size()), T_WI.R.matrix()};
     report_.degeneracy = find_degeneracy(report_.information, config_.weak_share, blind_ != nullptr ? *blind_ : BlindDirections{});
-    trust_ = keeps_weak_ ? 1 : blind_ != nullptr ? blind_->confirmed_with(report_.degeneracy.smallest_share) : 0;
-    first_ = false;
+    if (blind_ != nullptr) trust_ = std::max(trust_, blind_->confirmed_with(report_.degeneracy.smallest_share, config_.gate));
     report_.doubts_new = !sums.doubted.isZero(0) && (report_.degeneracy.weak_count > 0 || only_new_measures_one(sums));
     if (report_.doubts_new) sums = sum_rows(T_WI);
   }

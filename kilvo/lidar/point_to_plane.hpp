@@ -41,7 +41,7 @@ class LidarModel {
              const LidarConfig& config, const Workers& workers, const BlindDirections* blind = nullptr);
 
   /// Nothing else measures what the sweep hardly holds: what of it is not faked is kept, not only what sweeps in a row confirm.
-  void keep_weak() { keeps_weak_ = true; }
+  void keep_weak() { trust_ = 1; }
   /// Sweeps come at this interval (s): what a voxel was first seen to hold a moment ago may be a person who walks, and says little of a
   /// direction that only such surfaces measure.
   void doubt_new_surfaces(double interval);
@@ -103,8 +103,8 @@ class LidarModel {
   std::vector<std::uint32_t> plane_of_node_;  // place in rows_of_plane_; of nodes that have one while rows are counted
   std::vector<std::uint16_t> rows_of_plane_;  // of the last evaluation
   const BlindDirections* blind_;
-  bool first_ = true, keeps_weak_ = false;
-  double trust_ = 0;  // in what is left of a weak direction
+  bool first_ = true;
+  double trust_ = 0;                    // in what is left of a weak direction
   std::vector<double> moved_variance_;  // m^2, of surfaces that were first seen one, two, ... sweeps ago
   RegistrationReport report_;
 };

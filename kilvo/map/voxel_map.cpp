@@ -143,7 +143,6 @@ void VoxelMap::insert_one(const PointGroup& group, const Leaf& leaf, std::uint32
     const std::uint32_t i = nodes_.take();
     nodes_[i] = Node{};
     nodes_[i].epoch = epoch;
-    ++node_count_;
     return i;
   };
   const VoxelKey key = root_key(leaf);
@@ -192,11 +191,10 @@ void VoxelMap::free_children(Node& node) {
 void VoxelMap::free_tree(std::uint32_t index) {
   free_children(nodes_[index]);
   nodes_.free.push_back(index);
-  --node_count_;
 }
 
 void VoxelMap::forget(const Eigen::Vector3d& centre) {
-  const bool too_many = node_count_ > static_cast<std::size_t>(config_.max_nodes);
+  const bool too_many = node_count() > static_cast<std::size_t>(config_.max_nodes);
   if (!too_many && (centre - last_forget_).norm() < 0.05 * config_.radius) return;
   last_forget_ = centre;
   const auto squared_distance = [&](VoxelKey key) { return (centre_of(key, config_.voxel_size) - centre).squaredNorm(); };
@@ -209,7 +207,7 @@ void VoxelMap::forget(const Eigen::Vector3d& centre) {
     });
   };
   drop_beyond(config_.radius);
-  if (node_count_ > static_cast<std::size_t>(config_.max_nodes)) {
+  if (node_count() > static_cast<std::size_t>(config_.max_nodes)) {
     // Keep the nearest four fifths of the roots, so that this is rare.
     std::vector<double> distances(keys_.size());
     std::transform(keys_.begin(), keys_.end(), distances.begin(), squared_distance);

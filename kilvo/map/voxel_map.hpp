@@ -85,7 +85,7 @@ class VoxelMap {
     return pack_key(l[0], l[1], l[2]);
   }
   bool empty() const { return roots_.size() == 0; }
-  std::size_t node_count() const { return node_count_; }
+  std::size_t node_count() const { return nodes_.used - nodes_.free.size(); }
   /// Above every node id that a Match can have now.
   std::size_t node_capacity() const { return nodes_.used; }
   std::size_t memory_bytes() const;
@@ -164,7 +164,6 @@ class VoxelMap {
   std::vector<VoxelKey> keys_;  // of all roots, in order of creation (no result depends on hash order)
   Pool<Node> nodes_;
   Pool<Children> children_;
-  std::size_t node_count_ = 0;
   std::uint32_t sweep_ = 1000;               // counts the calls of see_through()
   double gone_soon_ = 0, moving_share_ = 1;  // planes of about a minute, which fade; 0 to 1
   std::uint32_t passed_last_ = 0;            // when a beam last passed through a plane
