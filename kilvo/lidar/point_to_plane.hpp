@@ -40,7 +40,7 @@ class LidarModel {
   LidarModel(const VoxelMap& map, std::span<const PointCluster> clusters, const Eigen::Vector3d& p_IL, const PoseCovariance& common_error,
              const LidarConfig& config, const Workers& workers, const BlindDirections* blind = nullptr);
 
-  /// Nothing else measures what the sweep hardly holds: what of it is not faked is kept, not only what sweeps in a row confirm.
+  /// No legs measure what the sweep hardly holds: what of it is not faked is kept, not only what sweeps in a row confirm.
   void keep_weak() { trust_ = 1; }
   /// Sweeps come at this interval (s): what a voxel was first seen to hold a moment ago may be a person who walks, and says little of a
   /// direction that only such surfaces measure.
