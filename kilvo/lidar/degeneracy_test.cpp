@@ -238,7 +238,7 @@ TEST(Degeneracy, AShareThatScattersAroundZeroIsNotKept) {
   EXPECT_LT(kept, 60) << "of 900 in every second sweep";
 }
 
-// Beside legs or images: 450 +- 450 in 40 sweeps that err alike in tens is chance, 450 +- 45 is not.
+// Beside legs: 450 +- 450 in 40 sweeps that err alike in tens is chance, 450 +- 45 is not.
 TEST(Degeneracy, OnlyWhatIsMoreThanChanceIsConfirmed) {
   Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Identity() * 1e6, fake = Eigen::Matrix<double, 6, 6>::Zero();
   fake(3, 3) = 1000;

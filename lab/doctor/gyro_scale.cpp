@@ -50,7 +50,9 @@ std::pair<double, double> gyro_scale(const std::vector<Turn>& turns, const GyroP
   // A unit is the same on all axes. One of them may seem to be off by as much for another reason: along a corridor sweeps show too little
   // of the rolling.
   constexpr double of_an_axis = 0.02;
-  const Eigen::Matrix3d C = jackknife(blocks, H).topLeftCorner<3, 3>() + of_an_axis * of_an_axis * Eigen::Matrix3d::Identity();
+  // An axis that hardly turns tells nothing, which the scatter alone does not show.
+  const Matrix open = scale * scale * H.ldlt().solve(Matrix::Identity());
+  const Eigen::Matrix3d C = (jackknife(blocks, H) + open).topLeftCorner<3, 3>() + of_an_axis * of_an_axis * Eigen::Matrix3d::Identity();
   const Eigen::Vector3d inverse = C.diagonal().cwiseInverse(), weights = inverse / inverse.sum();
   const double share = weights.dot(x.head<3>()), sigma = std::sqrt(weights.dot(C * weights));
   return share > 0 ? std::pair{1 / share, sigma / (share * share)} : std::pair<double, double>{1, INFINITY};

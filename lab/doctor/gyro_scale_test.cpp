@@ -14,11 +14,11 @@ constexpr double seconds = 10, interval = 0.1;
 Eigen::Vector3d rate(double t) { return {0.4 * std::sin(9 * t), 0.2 * std::sin(7 * t + 1), 0.2 * std::sin(5 * t + 2)}; }
 
 // By a gyro of these scales, and a sensor that is on the IMU's axes.
-std::pair<double, double> measured(const Eigen::Vector3d& of_gyro) {
+std::pair<double, double> measured(const Eigen::Vector3d& of_gyro, const Eigen::Vector3d& turning = Eigen::Vector3d::Ones()) {
   std::vector<InertialSample> samples, truth;
   for (double t = -0.2; t < seconds + 0.2; t += 0.005) {
-    samples.push_back({t, of_gyro.cwiseProduct(rate(t)), Eigen::Vector3d(0, 0, 9.81)});
-    truth.push_back({t, rate(t), Eigen::Vector3d(0, 0, 9.81)});
+    samples.push_back({t, of_gyro.cwiseProduct(turning.cwiseProduct(rate(t))), Eigen::Vector3d(0, 0, 9.81)});
+    truth.push_back({t, turning.cwiseProduct(rate(t)), Eigen::Vector3d(0, 0, 9.81)});
   }
   const GyroPath gyro(samples, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()),
       turned(truth, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
@@ -27,7 +27,8 @@ std::pair<double, double> measured(const Eigen::Vector3d& of_gyro) {
   std::vector<Turn> turns;
   for (int i = 0; i * interval < seconds; ++i) {
     const double a = i * interval, b = a + interval;
-    turns.push_back({a, b, {log_of(turned.between(a, b)) + Eigen::Vector3d(noise(random), noise(random), noise(random))}});
+    const Eigen::Vector3d off(noise(random), noise(random), noise(random));
+    turns.push_back({a, b, {log_of(turned.between(a, b)) + off, Eigen::Vector3d::Zero()}});
   }
   return gyro_scale(turns, gyro, MountFit{});
 }
@@ -38,6 +39,12 @@ TEST(GyroScale, OfAllAxesIsMeasuredAndSure) {
     EXPECT_NEAR(scale, factor, 0.005);
     EXPECT_LT(sigma, 0.02);
   }
+}
+
+TEST(GyroScale, OfARobotThatTurnsAboutOneAxisOnlyIsThatOfTheAxis) {
+  const auto [scale, sigma] = measured(Eigen::Vector3d::Constant(1.1), {0, 0, 1});
+  EXPECT_NEAR(scale, 1.1, 0.01);
+  EXPECT_LT(sigma, 0.03);
 }
 
 // Four standard deviations are asked for before it is accused.
