@@ -93,10 +93,10 @@ void History::rebase_to_closed() {
   replay_.forget_before(base_.t);
 }
 
-void History::correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior, bool alone, bool open) {
+void History::correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior, bool without_legs, bool open) {
   replay_.correlate_with_sweep(end, shared_with_sweep<at::R>(prior, posterior), shared_with_sweep<at::p>(prior, posterior));
   const double expected = (prior.P.diagonal() - posterior.P.diagonal()).segment<3>(at::v).sum();
-  if (expected > 0) replay_.learn_accel_noise(alone ? (posterior.x.v - prior.x.v).squaredNorm() / expected : 0, open);
+  if (expected > 0) replay_.learn_accel_noise(without_legs ? (posterior.x.v - prior.x.v).squaredNorm() / expected : 0, open);
 }
 
 void History::inflate_velocity(double sigma) {

@@ -73,8 +73,8 @@ class History {
   /// The pose at the time of `e` is that of `e`, its velocity has changed by `dv_W`: relative motion before stays what it was.
   void correct_trajectory(const Estimate& e, const Eigen::Vector3d& dv_W) { trajectory_.correct(e.t, e.x.pose(), dv_W); }
   /// A sweep until `end` took `prior` to `posterior`, of its middle: see Replay::correlate_with_sweep and,
-  /// where no legs have moved the velocity (`alone`), learn_accel_noise; `open`: it left a direction open.
-  void correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior, bool alone, bool open);
+  /// where no legs have moved the velocity (`without_legs`), learn_accel_noise; `open`: it left a direction open.
+  void correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior, bool without_legs, bool open);
   /// Adds the square of this standard deviation to the velocity's variance, m/s.
   void inflate_velocity(double sigma);
 

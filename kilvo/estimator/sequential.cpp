@@ -47,9 +47,9 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   history_.record_from(prior, end);
   if (!lidar_.has_shape(end, prior)) return findings_.drop(Sensor::lidar, Reason::before_motion);
   Statistics& statistics = findings_.statistics();
-  const bool first = map_.surfaces().empty(), alone = !status_.has_legs(), sees = has_camera(status_.modality());
+  const bool first = map_.surfaces().empty(), without_legs = !status_.has_legs(), sees = has_camera(status_.modality());
   const Registration sweep =
-      map_.register_sweep(lidar_, scan, end, alone, history_, prior, legs_.description_error(prior.x), statistics.points);
+      map_.register_sweep(lidar_, scan, end, without_legs, history_, prior, legs_.description_error(prior.x), statistics.points);
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
   if (sweep.refused) {
@@ -78,8 +78,8 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
                                     input_.robot().lidar.time_offset);
     history_.correct_trajectory(sweep.posterior, sweep.posterior.x.v - prior.x.v);
     lidar_.accept(sweep);
-    findings_.note_unmeasured(situation(), alone && !sees ? direction_of(lidar_.unobservable()) : std::nullopt);
-    if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior, alone, lidar_.is_blind_somewhere());
+    findings_.note_unmeasured(situation(), without_legs && !sees ? direction_of(lidar_.unobservable()) : std::nullopt);
+    if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior, without_legs, lidar_.is_blind_somewhere());
     if (first) map_.begin_at(T_WI, legs_.description_error(sweep.posterior.x));
     if (first && moving_start_) map_.begin_at(T_WI, moving_start_->error_at(T_WI));
     map_.learn(sweep, lidar_.unobservable(), first || lidar_.may_learn(prior, sweep, map_.error_at(prior.x.pose())));

@@ -31,16 +31,16 @@ void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservab
 
 // Where the prior is uncertain for what the accelerometer reported alone, the sweep fits where nothing has pushed the robot; where it fits,
 // a push was not what was reported, and the velocity that it gave is not known.
-Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool alone, History& history, Estimate& prior,
-                                      const PoseCovariance& considered, PointDrops& drops) const {
+Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool without_legs, History& history,
+                                      Estimate& prior, const PoseCovariance& considered, PointDrops& drops) const {
   const PoseCovariance error = error_at(prior.x.pose());
   const ProcessNoise noise = history.replay().noise_within(prior.t - (end - prior.t), end);
   // The error of a given map is not the drift's.
   Estimate relative = prior;
   const PoseCovariance released =
-      alone && !is_given_ ? lidar.release(relative, error, surfaces_.leaf_size() / 2) : PoseCovariance(PoseCovariance::Zero());
+      without_legs && !is_given_ ? lidar.release(relative, error, surfaces_.leaf_size() / 2) : PoseCovariance(PoseCovariance::Zero());
   Registration sweep =
-      lidar.measure(scan, {end, relative, history.trajectory(), noise, error + released, alone, considered}, surfaces_, drops);
+      lidar.measure(scan, {end, relative, history.trajectory(), noise, error + released, without_legs, considered}, surfaces_, drops);
   if (sweep.carries) sweep.released = released;
   if (!sweep.carries) sweep.posterior = prior;
   const bool is_surprised = lidar.is_surprised(prior, sweep, error);
@@ -52,7 +52,7 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& sca
   PointDrops counted;
   const PoseCovariance error_there = error_at(expected.x.pose());
   Registration again =
-      lidar.measure(scan, {end, expected, doubted->trajectory(), noise, error_there, alone, considered}, surfaces_, counted);
+      lidar.measure(scan, {end, expected, doubted->trajectory(), noise, error_there, without_legs, considered}, surfaces_, counted);
   if (again.refused || !again.carries || (!sweep.refused && !LidarPipeline::agrees(expected, again, error_there))) return sweep;
   history = std::move(*doubted);
   prior = expected;

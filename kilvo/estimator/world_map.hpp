@@ -25,8 +25,8 @@ class WorldMap {
   const MapError& error() const { return error_; }
 
   /// Registers a sweep until `end` from `prior`, of its middle. Where it is not for what the accelerometer reported, that is doubted: then
-  /// `history` and `prior` become what they are without. `alone`, `considered`: see LidarPipeline::Context. `drops`: counts unused points.
-  Registration register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool alone, History& history, Estimate& prior,
+  /// `history` and `prior` become what they are without. `without_legs`, `considered`: see LidarPipeline::Context; `drops` counts.
+  Registration register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool without_legs, History& history, Estimate& prior,
                               const PoseCovariance& considered, PointDrops& drops) const;
   /// A sweep fitted nowhere. True when that has lasted: the robot is taken to be outside of the map, and it restarts around `prior`,
   /// unless it was given.

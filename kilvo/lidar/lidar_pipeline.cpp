@@ -99,7 +99,7 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
   constexpr double to_leave = 3.0;
   if (is_blind_somewhere()) config.weak_share *= to_leave;
   LidarModel model(map, out.clusters, mount_.T_imu_lidar.p, context.map_error + out.considered, config, workers_, &blind_);
-  if (context.alone) model.keep_weak();
+  if (context.without_legs) model.keep_weak();
   // Sweeps whose points have no times, or times that span little, still come once in a period.
   model.doubt_new_surfaces(std::clamp(2 * to_seconds(context.end - prior.t), 0.5 / mount_.rate, 2 / mount_.rate));
   if (map.empty()) {

@@ -63,7 +63,7 @@ class LidarPipeline {
     const Trajectory& trajectory;                        // covers it
     const ProcessNoise& noise;                           // of the IMU within it
     const PoseCovariance& map_error;                     // of the map around the prior
-    bool alone = false;                                  // no legs measure what a sweep does not hold
+    bool without_legs = false;                           // no legs measure what a sweep does not hold
     PoseCovariance considered = PoseCovariance::Zero();  // see Registration
   };
   /// Along what the last sweep did not know a prior that is more uncertain than `reach` is taken relative to the planes around: the
