@@ -4,7 +4,7 @@
 #include <fmt/core.h>
 #include <stdexcept>
 
-#include "kilvo/calibration/rate_offset.hpp"
+#include "lab/clocks/rate_offset.hpp"
 
 namespace kilvo::cli {
 
@@ -28,7 +28,7 @@ void fit_to_machine(lab::Settings& settings, bool live, int threads) {
   if (live && !settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
   // Legs whose time is looked for may come so much later than the IMU's messages; in a recording they can be waited for.
   if (!live && settings.leg_clock.clock == "estimated" && !settings.given.contains("estimator.max_wait"))
-    settings.estimator.max_wait += RateOffset::reach();
+    settings.estimator.max_wait += lab::RateOffset::reach();
   // Reading and the map keep about one core busy.
   if (!settings.given.contains("estimator.threads")) settings.estimator.threads = live ? 1 : std::max(1, threads - 1);
 }

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "kilvo/calibration/leg_clock.hpp"
+#include "lab/clocks/leg_clock.hpp"
 #include "lab/messages/point_time_search.hpp"
 #include "lab/messages/sensor_intake.hpp"
 #include "lab/settings/settings.hpp"
@@ -93,7 +93,7 @@ class SensorInputs {
   Sink sink_;
   Say say_;
   double lidar_rate_;
-  LegClock leg_clock_;  // of the thread of IMU and legs
+  lab::LegClock leg_clock_;  // of the thread of IMU and legs
   // Of the thread of clouds and images:
   std::optional<lab::PointTimeFormat> point_time_;
   std::optional<lab::PointTimeSearch> search_;

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "kilvo/calibration/leg_clock.hpp"
 #include "kilvo/sensors/measurement_source.hpp"
+#include "lab/clocks/leg_clock.hpp"
 #include "lab/messages/point_time.hpp"
 #include "lab/messages/sensor_intake.hpp"
 #include "lab/recordings/recording_reader.hpp"

@@ -8,10 +8,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "kilvo/calibration/leg_clock.hpp"
 #include "kilvo/estimator/config.hpp"
 #include "kilvo/sensors/measurement.hpp"
 #include "kilvo/sensors/robot.hpp"
+#include "lab/clocks/leg_clock.hpp"
 #include "lab/mapping/map_builder.hpp"
 #include "lab/settings/calibration_config.hpp"
 #include "lab/settings/live_config.hpp"

@@ -1,4 +1,4 @@
-#include "kilvo/calibration/leg_clock.hpp"
+#include "lab/clocks/leg_clock.hpp"
 
 #include <algorithm>
 #include <fstream>
@@ -13,6 +13,12 @@
 
 namespace kilvo {
 namespace leg_clock_test {
+
+using lab::DeviceClock;
+using lab::LegClock;
+using lab::LegClockConfig;
+using lab::LowLevel;
+using lab::TickCounter;
 
 // What is wrong with the clocks of a robot. The IMU's stamps are right.
 struct Fault {

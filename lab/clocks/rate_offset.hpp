@@ -12,7 +12,7 @@
 
 #include "kilvo/sensors/time.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 
 class RateOffset {
  public:
@@ -67,4 +67,4 @@ class RateOffset {
   double noise_ = 0;                  // variance of a difference, each axis, (rad/s)^2
 };
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

@@ -7,7 +7,7 @@
 
 #include "kilvo/sensors/time.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 
 class DeviceClock {
  public:
@@ -35,4 +35,4 @@ class TickCounter {
   std::int64_t milliseconds_ = 0;
 };
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

@@ -1,8 +1,8 @@
-#include "kilvo/calibration/leg_clock.hpp"
+#include "lab/clocks/leg_clock.hpp"
 
 #include <array>
 
-namespace kilvo {
+namespace kilvo::lab {
 namespace {
 
 // As long as no rate is larger, a wrong time moves no joint by what could be seen; it is above the largest bias of a gyroscope, rad/s.
@@ -78,4 +78,4 @@ void LegClock::add_rates(const JointSample& s, const LowLevel& low_level) {
   rates_.add(s.t, std::span(candidates).first(count));
 }
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

@@ -1,4 +1,4 @@
-#include "kilvo/calibration/rate_offset.hpp"
+#include "lab/clocks/rate_offset.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "kilvo/filter/gap.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 namespace {
 
 // Differences this far apart in time are taken as independent, s.
@@ -148,4 +148,4 @@ void RateOffset::refine(const Sample& sample) {
   variance_ *= 1 - gain * slope.squaredNorm();
 }
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

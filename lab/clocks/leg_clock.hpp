@@ -10,13 +10,13 @@
 #include <tuple>
 #include <vector>
 
-#include "kilvo/calibration/device_clock.hpp"
-#include "kilvo/calibration/rate_offset.hpp"
 #include "kilvo/legs/link_kinematics.hpp"
 #include "kilvo/math/field.hpp"
 #include "kilvo/sensors/measurement.hpp"
+#include "lab/clocks/device_clock.hpp"
+#include "lab/clocks/rate_offset.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 
 struct LegClockConfig {
   std::string clock = "stamp";  // stamp | arrival | estimated
@@ -75,4 +75,4 @@ class LegClock {
   std::uint64_t withheld_ = 0;
 };
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

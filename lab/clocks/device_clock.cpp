@@ -1,9 +1,9 @@
-#include "kilvo/calibration/device_clock.hpp"
+#include "lab/clocks/device_clock.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-namespace kilvo {
+namespace kilvo::lab {
 namespace {
 
 // Over which times of arrival are averaged, s: an even counter carries the time from sample to sample, the nominal period less well.
@@ -46,4 +46,4 @@ Duration TickCounter::unwrapped(std::uint32_t tick) {
   return std::chrono::milliseconds(milliseconds_);
 }
 
-}  // namespace kilvo
+}  // namespace kilvo::lab
