@@ -148,9 +148,14 @@ void Findings::report_use(const Use& before, const Situation& now) {
   if (events_.all() != statistics_.events) statistics_.events = events_.all();
 }
 
-void Findings::report_turned_camera(const Situation& now, const Eigen::Vector3d& turned) {
+void Findings::report_turned_camera(const Situation& now, const Eigen::Vector3d& turned, const std::optional<SO3>& corrected) {
   const auto tenths = [](double value) { return decimals(value, 1); };
   const Eigen::Vector3d degrees = turned * (180 / M_PI);
+  if (corrected) {
+    std::string R;
+    for (const double element : corrected->matrix().reshaped<Eigen::RowMajor>()) R += (R.empty() ? "[" : ", ") + decimals(element, 5);
+    return report(now, Sensor::camera, Reason::mount_corrected, degrees.norm(), R + "]");
+  }
   report(now, Sensor::camera, Reason::camera_turned, degrees.norm(),
          tenths(degrees.x()) + ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()));
 }

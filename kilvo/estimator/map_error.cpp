@@ -94,18 +94,16 @@ void MapError::registered(const SE3& T_WI, std::span<const EpochInformation> epo
 }
 
 void MapError::seen(const SE3& T_WI, std::span<const EarlierView> views, const PoseCovariance& weak) {
-  double all = 0;
-  for (const EarlierView& view : views) all += view.weight;
-  if (!(all > 0)) return;
+  if (views.empty()) return;
   const PoseCovariance G = from_origin(T_WI);
   PoseCovariance sum = PoseCovariance::Zero();
   for (const EarlierView& view : views) {
     PoseCovariance error = G * view.error * G.transpose();
     // Each metre is wrong by the same share, so that standard deviations add.
     const double sigma = std::sqrt(std::max(0.0, (weak * error * weak.transpose()).bottomRightCorner<3, 3>().trace())),
-                 more = scale_error * view.distance;
+                 more = std::sqrt(scale_error * scale_error + view.share) * view.way.norm();
     error.bottomRightCorner<3, 3>().diagonal().array() += (2 * sigma + more) * more;
-    sum += (view.weight / all) * error;
+    sum += view.weight * error;
   }
   const PoseCovariance known = PoseCovariance::Identity() - weak, before = at(T_WI);
   const PoseCovariance H = to_origin(T_WI);

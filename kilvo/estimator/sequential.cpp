@@ -91,9 +91,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   history_.advance_to(end);
   findings_.use(Sensor::lidar);
   if (sweep.carries) status_.use(Sensor::lidar, end);
-  // Images hold what no sweep does: better than the legs do.
-  if (sweep.carries && !first && !(lidar_.is_blind_somewhere() && has_camera(status_.modality())))
-    legs_.pose_is_measured(lidar_.unobservable().bottomRightCorner<3, 3>());
+  if (sweep.carries && !first) legs_.pose_is_measured(lidar_.unobservable().bottomRightCorner<3, 3>());
   choose_modality(end);
   frames_.scan_used(middle);
   result.registration = sweep.report;
@@ -137,7 +135,7 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
     return refuse(Reason::not_finite);
   }
   history_.rebase(seen.posterior);
-  if (seen.refused == Reason::mount_doubted) findings_.report_turned_camera(situation(), seen.turned);
+  if (seen.refused == Reason::mount_doubted) findings_.report_turned_camera(situation(), seen.turned.by, seen.turned.corrected);
   if (seen.refused) return refuse(*seen.refused);
   findings_.use(Sensor::camera);
   history_.correct_trajectory(seen.posterior, seen.posterior.x.v - context.prior.x.v);

@@ -74,6 +74,7 @@ enum class Reason : std::uint8_t {
   state_thrown_away,
   foreign_images,
   camera_turned,
+  mount_corrected,
   inconsistent,
   diverged,
 };
@@ -170,6 +171,8 @@ inline constexpr std::array reasons = {
               "the images fit a camera that is rotated by {} degrees or more ([] about the axes of the IMU) against camera.T_imu_camera.R: "
               "check the calibration and camera.time_offset. Images are not used for some time",
               1, 1},
+    ReasonRow{Reason::mount_corrected, Severity::warning, "mount_corrected",
+              "its mount is off by {} degrees, and is corrected from now on: set camera.T_imu_camera.R to []", 1, 1},
     ReasonRow{Reason::inconsistent, Severity::warning, "inconsistent", "[]"},
     ReasonRow{Reason::diverged, Severity::error, "diverged", "[]"},
 };

@@ -12,27 +12,28 @@ namespace {
 
 constexpr int enough_views = 200;
 // A careful calibration reaches a tenth of this. What is found is less than what there is: patches that are far off are not found at all.
-constexpr double worth_saying = 0.005;                       // rad
-constexpr double sure = 6;                                   // standard deviations
-constexpr double best_view = 2e-4;                           // rad; smallest sigma of a view, for any number of patches
-constexpr double alike = 0.01;                               // rad; views rotated by less give no information,
-constexpr double alike_rate = 0.05;                          // rad/s; unless the robot turned at another rate
-constexpr double repeated = 20;                              // views of the same seconds repeat each other
-constexpr double likely_mount = 0.02, likely_offset = 0.02;  // rad, s
+constexpr double worth_saying = 0.005;  // rad
+constexpr double sure = 6;              // standard deviations
+constexpr double best_view = 2e-4;      // rad; smallest sigma of a view, for any number of patches
+constexpr double alike = 0.01;          // rad; views rotated by less give no information,
+constexpr double alike_rate = 0.05;     // rad/s; unless the robot turned at another rate
+constexpr double repeated = 20;         // views of the same seconds repeat each other
+constexpr double likely_offset = 0.02;  // s
 
 }  // namespace
 
-void MountCheck::add(const View& image, const View& earlier, const Eigen::Matrix3d& A, const Eigen::Vector3d& b) {
+bool MountCheck::add(const View& image, const View& earlier, const Eigen::Matrix3d& A, const Eigen::Vector3d& b) {
   const SO3 turn = image.R_WI.inverse() * earlier.R_WI;
   Eigen::Matrix<double, 3, 4> H;
   H << turn.matrix() - Eigen::Matrix3d::Identity(), image.omega - turn * earlier.omega;
-  if (turn.Log().norm() < alike && H.col(3).norm() < alike_rate) return;
+  if (turn.Log().norm() < alike && H.col(3).norm() < alike_rate) return false;
   // (A^-1 + s^2 I)^-1, of an A that may be singular.
   const Eigen::Matrix3d limited = Eigen::Matrix3d::Identity() + best_view * best_view * A;
   const Eigen::Matrix3d inverse = limited.inverse();
   N_ += H.transpose() * inverse * A * H;
   n_ += H.transpose() * inverse * b;
   ++views_;
+  return true;
 }
 
 std::optional<double> MountCheck::time_offset(double least) const {

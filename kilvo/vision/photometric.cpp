@@ -131,8 +131,8 @@ std::optional<PhotometricModel::Found> PhotometricModel::find(const Eigen::Matri
 void PhotometricModel::note_turn(std::uint32_t frame, const Part& part, const Found& found) {
   constexpr double most = 6;  // px; farther, the patch has hardly been found
   if (found.displacement.squaredNorm() > most * most) return;
-  auto turn = std::ranges::find_if(turns_, [frame](const Turn& t) { return t.frame == frame; });
-  if (turn == turns_.end()) turn = turns_.insert(turns_.end(), Turn{frame, Eigen::Matrix3d::Zero(), Eigen::Vector3d::Zero()});
+  auto turn = std::ranges::find_if(turns_, [frame](const ImageTurn& t) { return t.frame == frame; });
+  if (turn == turns_.end()) turn = turns_.insert(turns_.end(), ImageTurn{frame, Eigen::Matrix3d::Zero(), Eigen::Vector3d::Zero()});
   const Eigen::Matrix<double, 3, 2> JW = part.view.J.leftCols<3>().transpose() * found.variance.inverse();
   turn->A += JW * part.view.J.leftCols<3>();
   // r = I(u) - T: what the image shows at u lies `displacement` beyond its place, so the body must turn by the opposite.

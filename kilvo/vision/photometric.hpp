@@ -14,6 +14,7 @@
 #include "kilvo/map/visual_map.hpp"
 #include "kilvo/vision/brightness.hpp"
 #include "kilvo/vision/camera.hpp"
+#include "kilvo/vision/mount_check.hpp"
 #include "kilvo/vision/patch_sums.hpp"
 #include "kilvo/vision/patches.hpp"
 #include "kilvo/vision/select_patches.hpp"
@@ -56,13 +57,6 @@ class PhotometricModel {
     double weight = 0;  // 1/m^2
   };
 
-  /// The rotation of the body measured by one frame's patches, before any was rejected for its position.
-  struct Turn {
-    std::uint32_t frame = 0;
-    Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d b = Eigen::Vector3d::Zero();  // A * turn
-  };
-
   /// How often it must be called to be at the finest level.
   int iterations() const { return static_cast<int>(schedule_.size()); }
 
@@ -70,7 +64,7 @@ class PhotometricModel {
   std::optional<Brightness> exposure_at(const State& x) const;
 
   /// Of the first evaluation.
-  const std::vector<Turn>& turns() const { return turns_; }
+  const std::vector<ImageTurn>& turns() const { return turns_; }
   // Of the last evaluation:
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
   const Report& report() const { return report_; }
@@ -131,7 +125,7 @@ class PhotometricModel {
   };
   std::vector<Group> groups_;
   std::vector<FrameShare> by_frame_;
-  std::vector<Turn> turns_;
+  std::vector<ImageTurn> turns_;
 };
 
 }  // namespace kilvo

@@ -44,11 +44,11 @@ struct VisualPipeline::Work {
   Work(const VisualPipeline& p, const CameraImage& of, const ImageContext& in)
       : image(of),
         context(in),
-        T_CI(in.prior.t == of.t ? p.T_CI_ : p.T_CI_ * in.T_image.inverse() * in.T_prior),
+        T_CI(in.prior.t == of.t ? p.errors_.T_CI() : p.errors_.T_CI() * in.T_image.inverse() * in.T_prior),
         pyramid(pyramid_of(to_grey(of.image), Patch::levels)),
         depth(p.camera_, T_CI * in.prior.x.pose().inverse(), p.seen_W_),
         tracks(select_patches(p.map_, p.camera_, T_CI * in.prior.x.pose().inverse(), depth, p.config_)),
-        model(p.map_, p.camera_, T_CI, pyramid, tracks, in.prior, p.config_),
+        model(p.map_, p.camera_, T_CI, pyramid, tracks, p.errors_.with_turn(in.prior), p.config_),
         prior(in.prior),
         omega(in.gyro - in.prior.x.bg) {}
 
@@ -61,18 +61,14 @@ struct VisualPipeline::Work {
   PhotometricModel model;
   Estimate prior;  // with the exposure that the image has
   Estimate posterior;
+  Information<7> info;  // of the last evaluation, and where that was
+  State at;
   Eigen::Vector3d omega;  // of the body, rad/s
 };
 
 VisualPipeline::VisualPipeline(const CameraMount& mount, const VisionConfig& config, const VisualMapConfig& map, const UpdateConfig& update,
                                double map_radius)
-    : mount_(mount),
-      config_(config),
-      update_(update),
-      map_radius_(map_radius),
-      camera_(mount),
-      T_CI_(mount.T_imu_camera.inverse()),
-      map_(map) {}
+    : mount_(mount), config_(config), update_(update), map_radius_(map_radius), camera_(mount), map_(map), errors_(mount.T_imu_camera) {}
 VisualPipeline::VisualPipeline(VisualPipeline&&) noexcept = default;
 VisualPipeline& VisualPipeline::operator=(VisualPipeline&&) noexcept = default;
 VisualPipeline::~VisualPipeline() = default;
@@ -92,7 +88,7 @@ std::optional<VisualPipeline::Fault> VisualPipeline::fault_of(const CameraImage&
 }
 
 std::optional<Reason> VisualPipeline::refuses(Time image) const {
-  if (image < mount_watch_.refused_until) return Reason::mount_doubted;
+  if (errors_.refuses(image)) return Reason::mount_doubted;
   if (image < begins_at_) return Reason::before_motion;
   if (seen_W_.empty()) return Reason::before_sweep;
   return std::nullopt;
@@ -115,7 +111,10 @@ VisualRegistration VisualPipeline::measure(const CameraImage& image, const Image
     out.refused = Reason::not_finite;
     return out;
   }
-  if (const auto turned = context.prior.t == image.t ? check_mount(*work) : std::nullopt) {
+  // Along what no sweep holds an error of the position would look like one of the camera.
+  const bool held = context.prior.t == image.t && context.unobservable.isZero(0);
+  if (held) learn_errors(*work);
+  if (const auto turned = held ? errors_.judge(image.t) : std::nullopt) {
     // Its patches lie where the wrong mount put them.
     forget_map();
     out.turned = *turned;
@@ -126,11 +125,13 @@ VisualRegistration VisualPipeline::measure(const CameraImage& image, const Image
     out.refused = Reason::agrees_with_nothing;
     return out;
   }
-  out.posterior = work->posterior;
   out.used = model.report().used;
   out.carries = carries_estimate(model.report());
+  // A few patches among many may fit anywhere.
+  if (!out.carries) work->posterior = work->prior;
+  out.posterior = work->posterior;
   out.T_WI = as_the_map_has_it(work->prior.x, out.posterior.x, context.unobservable);
-  if (!context.unobservable.isZero(0) && !context.feet_hold && out.used >= enough) out.drift = drift_of(*work, out.posterior.x.pose());
+  if (!context.unobservable.isZero(0) && !context.feet_hold && out.carries) out.drift = views_of(*work, out.posterior.x.p);
   work_ = std::move(work);
   return out;
 }
@@ -153,18 +154,39 @@ Estimate VisualPipeline::update_by(Work& work) {
   config.min_iterations = work.model.iterations();
   config.max_iterations = std::max(config.max_iterations, work.model.iterations() + 2);
   auto measured = [&, first = true](const State& x, const Covariance& P) mutable {
-    Information<7> info = work.model(x, P);
-    if (std::exchange(first, false) && work.model.report().used >= enough) excess_.add(normalised_innovation(info, P));
-    info.A /= excess_.variance();
-    info.b /= excess_.variance();
-    if (work.context.feet_hold) {
-      Eigen::Matrix<double, 7, 7> common = Eigen::Matrix<double, 7, 7>::Zero();
-      common.topLeftCorner<6, 6>() = doubt_of_way(work, x.pose());
-      add_common_noise<7>(common, info);
-    }
+    Information<7> info = work.model(x, errors_.with_turn({work.prior.t, x, P}).P);
+    Eigen::Matrix<double, 7, 7> common = Eigen::Matrix<double, 7, 7>::Zero();
+    common.topLeftCorner<3, 3>().diagonal().setConstant(errors_.turn_variance());
+    if (!common.isZero(0)) add_common_noise<7>(common, info);
+    if (std::exchange(first, false) && work.model.report().used >= enough) errors_.excess().add(normalised_innovation(info, P));
+    work.info = info;
+    work.at = x;
+    info.A /= errors_.excess().variance();
+    info.b /= errors_.excess().variance();
+    common.setZero();
+    common.topLeftCorner<6, 6>() = doubt_of_way(work, x.pose());
+    if (!common.isZero(0)) add_common_noise<7>(common, info);
     return info;
   };
   return update(work.prior, measured, config).posterior;
+}
+
+// What the image shows against the prior: turns at the first evaluation, the way along its own direction at the last.
+void VisualPipeline::learn_errors(const Work& work) {
+  const Covariance& P = work.prior.P;
+  errors_.add_turns({work.prior.x.R, work.omega}, map_, work.model.turns(), 2 * P.topLeftCorner<3, 3>().trace());
+  if (!carries_estimate(work.model.report())) return;
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();
+  double distance = 0;
+  for (const EarlierView& view : views_of(work, work.at.p)) {
+    way += view.weight * view.way;
+    distance += view.weight * view.way.norm();
+  }
+  const Eigen::Vector3d along = way.normalized();
+  const double known = along.dot(work.info.A.block<3, 3>(3, 3) * along);
+  if (!(known > 0)) return;
+  const double shift = along.dot(work.at.p - work.prior.x.p + work.info.b.segment<3>(3) / known);
+  errors_.add_shift(shift, 1 / known + along.dot(P.block<3, 3>(at::p, at::p) * along), distance);
 }
 
 // Patches are found within some pixels of where they are expected. Along what the LiDAR does not measure the position is from the images:
@@ -187,49 +209,32 @@ bool VisualPipeline::says_nothing(const Work& work) {
   return nothing && in_vain_ <= patient;
 }
 
-// Stance feet measure the distance along what no sweep measures to a few parts in ten thousand, images to a part in thousand, and their
-// error is the same in image after image until other patches are seen: beside feet, images only catch what feet get grossly wrong.
+// Along what no sweep measures images are wrong by a share of the distance, the same in image after image until other patches are seen.
+// Stance feet measure it to a few parts in ten thousand: beside them images only catch what feet get grossly wrong.
 PoseCovariance VisualPipeline::doubt_of_way(const Work& work, const SE3& T_WI) const {
-  constexpr double wrong_share = 0.3;  // of the distance from the frames
-  double way = 0, weights = 0;
-  for (const auto& [frame, weight] : work.model.by_frame()) {
-    way += weight * (T_WI.p - position_of(map_.frame(frame))).norm();
-    weights += weight;
-  }
-  if (!(weights > 0)) return PoseCovariance::Zero();
-  way /= weights;
+  constexpr double beside_feet = 0.3;
+  if (work.context.unobservable.isZero(0)) return PoseCovariance::Zero();
+  double way = 0;
+  for (const EarlierView& view : views_of(work, T_WI.p)) way += view.weight * view.way.norm();
   constexpr double shortest_step = 0.01;  // m
   const double images = std::max(1.0, way / std::max(shortest_step, (T_WI.p - last_p_).norm()));
   PoseCovariance V = PoseCovariance::Zero();
-  V.diagonal().tail<3>().setConstant(wrong_share * wrong_share * way * way * images);
+  const double variance = work.context.feet_hold ? beside_feet * beside_feet : errors_.way_variance();
+  V.diagonal().tail<3>().setConstant(variance * way * way * images);
   return work.context.unobservable * V * work.context.unobservable.transpose();
 }
 
-std::vector<EarlierView> VisualPipeline::drift_of(const Work& work, const SE3& T_WI) const {
+// Of what the image tells of the position.
+std::vector<EarlierView> VisualPipeline::views_of(const Work& work, const Eigen::Vector3d& p_W) const {
   std::vector<EarlierView> out;
-  for (const auto& [frame, weight] : work.model.by_frame())
-    out.push_back({map_.frame(frame).error, (T_WI.p - position_of(map_.frame(frame))).norm(), weight});
-  return out;
-}
-
-Eigen::Vector3d VisualPipeline::position_of(const VisualFrame& frame) const { return (frame.T_CW.inverse() * T_CI_).p; }
-
-// The turn of the camera in the IMU frame, rad, if there is one worth speaking of. The camera is tried again later, each time later still:
-// the cause of a false alarm may have passed.
-std::optional<Eigen::Vector3d> VisualPipeline::check_mount(const Work& work) {
-  for (const PhotometricModel::Turn& turn : work.model.turns()) {
-    const VisualFrame& frame = map_.frame(turn.frame);
-    const SO3 R_IW = T_CI_.R.inverse() * frame.T_CW.R;
-    mount_watch_.check.add({work.prior.x.R, work.omega}, {R_IW.inverse(), frame.omega}, turn.A, turn.b);
+  double all = 0;
+  for (const auto& [frame, weight] : work.model.by_frame()) all += weight;
+  if (!(all > 0)) return out;
+  for (const auto& [id, weight] : work.model.by_frame()) {
+    const VisualFrame& frame = map_.frame(id);
+    out.push_back({frame.error, p_W - (frame.T_CW.inverse() * errors_.T_CI()).p, weight / all, errors_.way_variance()});
   }
-  const auto psi = mount_watch_.check.misalignment();
-  if (!psi) return std::nullopt;
-  constexpr Duration first_pause = std::chrono::seconds(10), longest_pause = std::chrono::minutes(5);
-  Duration& pause = mount_watch_.pause;
-  pause = pause == Duration(0) ? first_pause : std::min(longest_pause, 2 * pause);
-  mount_watch_.refused_until = work.posterior.t + pause;
-  restart_mount_check();
-  return psi;
+  return out;
 }
 
 std::vector<ColouredPoint> VisualPipeline::learn(const VoxelMap& map, const PoseCovariance& error) {
@@ -283,14 +288,12 @@ void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const S
 }
 
 std::optional<double> VisualPipeline::clock_offset() {
-  const auto offset = mount_watch_.check.time_offset(least_clock_offset);
-  if (!offset) return std::nullopt;
-  restart_mount_check();
-  forget_map();
+  const auto offset = errors_.clock_offset();
+  if (offset) forget_map();
   return offset;
 }
 
-void VisualPipeline::restart_mount_check() { mount_watch_.check = MountCheck(); }
+void VisualPipeline::restart_mount_check() { errors_.restart(); }
 
 void VisualPipeline::forget_map() { map_.clear(); }
 

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "kilvo/filter/innovation.hpp"
 #include "kilvo/filter/pose_error.hpp"
 #include "kilvo/filter/state.hpp"
 #include "kilvo/filter/update_config.hpp"
@@ -17,8 +16,8 @@
 #include "kilvo/sensors/reason.hpp"
 #include "kilvo/sensors/robot.hpp"
 #include "kilvo/vision/camera.hpp"
+#include "kilvo/vision/camera_errors.hpp"
 #include "kilvo/vision/colours.hpp"
-#include "kilvo/vision/mount_check.hpp"
 #include "kilvo/vision/vision_config.hpp"
 
 namespace kilvo {
@@ -37,11 +36,11 @@ struct ImageContext {
 /// The result of an image.
 struct VisualRegistration {
   std::optional<Reason> refused;
-  Eigen::Vector3d turned = Eigen::Vector3d::Zero();  // of mount_doubted: by how much the camera seems to be, about the IMU's axes, rad
-  Estimate posterior;                                // of the prior's time; of a refused image the prior, unless it is not finite
-  SE3 T_WI;                                          // where the image's patches are kept, see VisualPipeline::learn
-  int used = 0;                                      // patches that were found as they were
-  bool carries = false;                              // so many that they carry the estimate
+  CameraErrors::Turned turned{};  // of mount_doubted
+  Estimate posterior;             // of the prior's time; of a refused image the prior, unless it is not finite
+  SE3 T_WI;                       // where the image's patches are kept, see VisualPipeline::learn
+  int used = 0;                   // patches that were found as they were
+  bool carries = false;           // so many that they carry the estimate
   /// Along what no sweep measures the pose has the errors of the frames that it was compared with, as given to learn().
   std::vector<EarlierView> drift;
 };
@@ -89,29 +88,19 @@ class VisualPipeline {
   bool is_lost_among_patches(const ImageContext& context) const;
   void adapt_exposure(Work& work) const;
   Estimate update_by(Work& work);
+  void learn_errors(const Work& work);
   bool says_nothing(const Work& work);
-  std::optional<Eigen::Vector3d> check_mount(const Work& work);
   PoseCovariance doubt_of_way(const Work& work, const SE3& T_WI) const;
-  std::vector<EarlierView> drift_of(const Work& work, const SE3& T_WI) const;
+  std::vector<EarlierView> views_of(const Work& work, const Eigen::Vector3d& p_W) const;
   void judge_points(const Work& work, const VoxelMap& map, const SE3& T_CW, std::uint32_t frame);
-  Eigen::Vector3d position_of(const VisualFrame& frame) const;
-
-  // The check of the mount, and how long images are not used after a fault of it.
-  struct MountWatch {
-    MountCheck check;
-    Time refused_until{};
-    Duration pause{};  // after the last fault
-  };
 
   CameraMount mount_;
   VisionConfig config_;
   UpdateConfig update_;
   double map_radius_;  // m
   Camera camera_;
-  SE3 T_CI_;
   VisualMap map_;
-  MountWatch mount_watch_;
-  InnovationScale excess_;  // excess of the images' innovations: errors of calibration
+  CameraErrors errors_;
   Time begins_at_{};
   int in_vain_ = 0;                                   // images in a row in which hardly any patch was found
   Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();  // of the last image, m
