@@ -127,6 +127,7 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
   if (!seen.refused && seen.used < config_.vision.fewest_points) {
     seen.posterior = context.prior;
     seen.carries = false;
+    seen.drift.clear();
   }
   if (seen.refused == Reason::pose_uncertain) return refuse(*seen.refused);
   if (seen.refused == Reason::not_finite) {

@@ -10,10 +10,10 @@ namespace kilvo {
 
 /// An earlier pose that a measurement was held against.
 struct EarlierView {
-  PoseCovariance error;  // of that pose, as a twist at the world's origin
-  Eigen::Vector3d way;   // from there, m
-  double weight = 0;     // how much of the measurement comes from it; their sum is 1
-  double share = 0;      // variance of the error of the distance, per distance^2
+  PoseCovariance error = PoseCovariance::Zero();  // of that pose, as a twist at the world's origin
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();  // from there, m
+  double weight = 0;                              // how much of the measurement comes from it; their sum is 1
+  double share = 0;                               // variance of the error of the distance, per distance^2
 };
 
 /// What measurements against one epoch of the map (VoxelMap::insert) know about the pose.

@@ -46,16 +46,17 @@ std::optional<CameraErrors::Turned> CameraErrors::judge(Time t) {
   const auto psi = check_.misalignment();
   if (!psi) return std::nullopt;
   const SO3 R_IC = SO3::Exp(-*psi) * T_CI_.R.inverse();
-  if ((R_described_.inverse() * R_IC).Log().norm() < likely_mount) {
+  const Eigen::Vector3d turned = (R_IC * R_described_.inverse()).Log();
+  if (turned.norm() < likely_mount) {
     T_CI_ = SE3{R_IC, T_CI_.inverse().p}.inverse();
     check_.correct(*psi, 0);
-    return Turned{*psi, R_IC};
+    return Turned{turned, R_IC};
   }
   constexpr Duration first_pause = std::chrono::seconds(10), longest_pause = std::chrono::minutes(5);
   pause_ = pause_ == Duration(0) ? first_pause : std::min(longest_pause, 2 * pause_);
   refused_until_ = t + pause_;
   restart();
-  return Turned{*psi, std::nullopt};
+  return Turned{turned, std::nullopt};
 }
 
 std::optional<double> CameraErrors::clock_offset() {

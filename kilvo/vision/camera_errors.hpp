@@ -25,10 +25,10 @@ class CameraErrors {
 
   /// The turns of the body that an image shows against the frames of `map`. `expected`: variance of the held rotation, about all axes.
   void add_turns(const MountCheck::View& image, const VisualMap& map, std::span<const ImageTurn> turns, double expected);
-  /// How much farther than where sweeps hold it the robot is from the image's frames, m, of the given variance, after `way`, m.
+  /// How much farther from its frames than for the sweeps an image shows the robot, m, of the variance that is expected, after `way`, m.
   void add_shift(double shift, double variance, double way);
 
-  /// Of a turn of the image about each axis, common to all of its patches, rad^2.
+  /// Of a turn of the image about each axis, common to all of its patches, rad^2. That it is alike in images in a row is for excess().
   double turn_variance() const { return std::max(0.0, turn_.mean()); }
   /// Of the error of the distance from earlier images, per distance^2; the same for images in a row.
   double way_variance() const { return std::max(0.0, way_.mean()); }
@@ -38,8 +38,8 @@ class CameraErrors {
   InnovationScale& excess() { return excess_; }
 
   struct Turned {
-    Eigen::Vector3d by;            // about the IMU's axes, rad
-    std::optional<SO3> corrected;  // the camera's rotation in the IMU frame from now on
+    Eigen::Vector3d by = Eigen::Vector3d::Zero();  // of the camera against the description, about the IMU's axes, rad
+    std::optional<SO3> corrected;                  // the camera's rotation in the IMU frame from now on
   };
   /// Whether the mount is another one than described. What a careful description may be off by is corrected. With more the camera is not
   /// used for some time from `t` on, each time for longer: the cause of a false alarm may have passed.

@@ -1,6 +1,6 @@
-// Whether the camera is mounted as configured. If it is turned by psi (IMU frame), a view from R_r puts the points of a map so that, seen
-// from R_c, the camera seems to be turned by (R_c' R_r - I) psi against where the LiDAR has it: nothing while the robot keeps its
-// orientation, the more the more it turns. If its stamps are tau too small, it seems to be turned by (omega_c - R_c' R_r omega_r) tau
+// Whether the camera is mounted as configured. If it is turned by -psi (IMU frame) against that, a view from R_r puts the points of a map
+// so that, seen from R_c, the camera seems to be turned by (R_c' R_r - I) psi against where the LiDAR has it: nothing while the robot keeps
+// its orientation, the more the more it turns. If its stamps are tau too small, it seems to be turned by (omega_c - R_c' R_r omega_r) tau
 // besides. So psi and tau are a least-squares problem over all images, and small turns suffice.
 #pragma once
 
@@ -32,15 +32,16 @@ class MountCheck {
   /// where a wrong mount or clock would turn both alike.
   bool add(const View& image, const View& earlier, const Eigen::Matrix3d& A, const Eigen::Vector3d& b);
 
-  /// The turn of the camera in the IMU frame, rad, if the images so far are sure that there is one worth speaking of.
+  /// psi, the turn of the description against the camera in the IMU frame, rad, if the images so far are sure of one worth speaking of.
   std::optional<Eigen::Vector3d> misalignment() const;
 
   /// s, to be added to the stamps of the images, if they are sure that these are off by more than `least`.
   std::optional<double> time_offset(double least) const;
 
-  /// So much of both is corrected: the images so far speak of what is left.
+  /// So much of both is corrected: the images so far speak of what is left, and those to come judge it.
   void correct(const Eigen::Vector3d& misalignment, double time_offset) {
     n_ -= N_ * (Eigen::Vector4d() << misalignment, time_offset).finished();
+    views_ = 0;
   }
 
  private:

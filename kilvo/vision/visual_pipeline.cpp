@@ -17,6 +17,7 @@ namespace {
 
 // So many patches hold a pose by themselves; of those that should be seen, one in so many is found.
 constexpr int enough = 20, one_in = 5;
+constexpr double usual_depth = 3;  // m, of patches
 
 // Fewer patches, or a smaller share of those that should be seen, do not carry an estimate.
 bool carries_estimate(const PhotometricModel::Report& report) {
@@ -174,32 +175,34 @@ Estimate VisualPipeline::update_by(Work& work) {
 // What the image shows against the prior: turns at the first evaluation, the way along its own direction at the last.
 void VisualPipeline::learn_errors(const Work& work) {
   const Covariance& P = work.prior.P;
-  errors_.add_turns({work.prior.x.R, work.omega}, map_, work.model.turns(), 2 * P.topLeftCorner<3, 3>().trace());
+  const double turned = P.topLeftCorner<3, 3>().trace(), moved = P.block<3, 3>(at::p, at::p).trace();
+  errors_.add_turns({work.prior.x.R, work.omega}, map_, work.model.turns(), 2 * (turned + moved / (usual_depth * usual_depth)));
   if (!carries_estimate(work.model.report())) return;
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
-  double distance = 0;
-  for (const EarlierView& view : views_of(work, work.at.p)) {
-    way += view.weight * view.way;
-    distance += view.weight * view.way.norm();
-  }
+  for (const EarlierView& view : views_of(work, work.at.p)) way += view.weight * view.way;
   const Eigen::Vector3d along = way.normalized();
   const double known = along.dot(work.info.A.block<3, 3>(3, 3) * along);
   if (!(known > 0)) return;
-  const double shift = along.dot(work.at.p - work.prior.x.p + work.info.b.segment<3>(3) / known);
-  errors_.add_shift(shift, 1 / known + along.dot(P.block<3, 3>(at::p, at::p) * along), distance);
+  // The row of the image's equations A (x - x0) + b = 0 along the way, of (rotation, position, exposure).
+  const Eigen::Matrix<double, 7, 1> row = work.info.A.middleRows<3>(3).transpose() * along / known;
+  Eigen::Matrix<double, 7, 1> from_prior;
+  from_prior << boxminus(work.at, work.prior.x).head<6>(), work.at.tau - work.prior.x.tau;
+  const double shift = row.dot(from_prior) - along.dot(work.info.b.segment<3>(3)) / known;
+  const double variance = row.head<6>().dot(P.topLeftCorner<6, 6>() * row.head<6>()) + row[6] * row[6] * P(at::tau, at::tau);
+  errors_.add_shift(shift, 1 / known + variance, way.norm());
 }
 
 // Patches are found within some pixels of where they are expected. Along what the LiDAR does not measure the position is from the images:
 // it may be uncertain, and new patches are begun there.
 bool VisualPipeline::is_lost_among_patches(const ImageContext& context) const {
-  constexpr double reach = 8, depth = 3;  // px, m
+  constexpr double reach = 8;  // px
   const PoseCovariance known = PoseCovariance::Identity() - context.unobservable;
   const PoseCovariance P = known * context.prior.P.topLeftCorner<6, 6>() * known.transpose();
   const double turned = P.topLeftCorner<3, 3>().trace(), moved = P.bottomRightCorner<3, 3>().trace();
-  return mount_.fx * std::sqrt(std::max(0.0, turned + moved / (depth * depth))) > reach;
+  return mount_.fx * std::sqrt(std::max(0.0, turned + moved / (usual_depth * usual_depth))) > reach;
 }
 
-// An image that hardly any of many patches is found in is dark, covered, torn, or of another world: nothing is learnt from it, unless
+// An image that hardly any of many patches is found in is dark, covered, torn, or of another world: the map learns nothing from it, unless
 // that goes on, for then the world has changed.
 bool VisualPipeline::says_nothing(const Work& work) {
   constexpr int patient = 20;  // images
