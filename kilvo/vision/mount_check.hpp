@@ -38,10 +38,9 @@ class MountCheck {
   /// s, to be added to the stamps of the images, if they are sure that these are off by more than `least`.
   std::optional<double> time_offset(double least) const;
 
-  /// So much of both is corrected: the images so far speak of what is left, and those to come judge it.
+  /// So much of both is corrected: the images so far speak of what is left.
   void correct(const Eigen::Vector3d& misalignment, double time_offset) {
     n_ -= N_ * (Eigen::Vector4d() << misalignment, time_offset).finished();
-    views_ = 0;
   }
 
  private:

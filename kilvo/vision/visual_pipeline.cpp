@@ -250,8 +250,9 @@ std::vector<ColouredPoint> VisualPipeline::learn(const VoxelMap& map, const Pose
   frame.tau = posterior.x.tau;
   frame.omega = work.omega;
   frame.error = error;
-  // Along what the LiDAR does not know, the error of this frame is that of the next ones: drift, which the epoch carries.
-  const PoseCovariance own = to_origin(T_WI) * known;
+  // Beside feet the error of this frame along what the LiDAR does not know is that of the next ones: drift, which the epoch carries. Images
+  // alone must not make certain what was uncertain when the frame was taken.
+  const PoseCovariance own = work.context.feet_hold ? PoseCovariance(to_origin(T_WI) * known) : to_origin(T_WI);
   frame.noise.topLeftCorner<6, 6>() = own * work.prior.P.topLeftCorner<6, 6>() * own.transpose();
   frame.noise(6, 6) = posterior.P(at::tau, at::tau);
   const std::uint32_t id = map_.add_frame(frame);
