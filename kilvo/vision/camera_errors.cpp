@@ -33,6 +33,20 @@ void CameraErrors::add_turns(const MountCheck::View& image, const VisualMap& map
   learn(((V * b).squaredNorm() - all) / 3, all / 3, small_turn, turn_);
 }
 
+void CameraErrors::add_way(const Information<7>& info, const State& x, const Estimate& prior, const Eigen::Vector3d& way) {
+  const Covariance& P = prior.P;
+  const Eigen::Vector3d along = way.normalized();
+  const double known = along.dot(info.A.block<3, 3>(3, 3) * along);
+  if (!(known > 0)) return;
+  // The row of the image's equations A (x - x0) + b = 0 along the way, of (rotation, position, exposure).
+  const Eigen::Matrix<double, 7, 1> row = info.A.middleRows<3>(3).transpose() * along / known;
+  Eigen::Matrix<double, 7, 1> from_prior;
+  from_prior << boxminus(x, prior.x).head<6>(), x.tau - prior.x.tau;
+  const double shift = row.dot(from_prior) - along.dot(info.b.segment<3>(3)) / known;
+  const double variance = row.head<6>().dot(P.topLeftCorner<6, 6>() * row.head<6>()) + row[6] * row[6] * P(at::tau, at::tau);
+  add_shift(shift, 1 / known + variance, way.norm());
+}
+
 void CameraErrors::add_shift(double shift, double variance, double way) {
   if (way > 0) learn((shift * shift - variance) / (way * way), variance / (way * way), small_share, way_);
 }

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "kilvo/filter/innovation.hpp"
+#include "kilvo/filter/measurement_rows.hpp"
 #include "kilvo/filter/state.hpp"
 #include "kilvo/map/visual_map.hpp"
 #include "kilvo/math/running_statistics.hpp"
@@ -25,6 +26,8 @@ class CameraErrors {
 
   /// The turns of the body that an image shows against the frames of `map`. `expected`: variance of the held rotation, about all axes.
   void add_turns(const MountCheck::View& image, const VisualMap& map, std::span<const ImageTurn> turns, double expected);
+  /// An image measures `info` at the iterate `x`, where sweeps hold `prior`; `way`: from its frames, m.
+  void add_way(const Information<7>& info, const State& x, const Estimate& prior, const Eigen::Vector3d& way);
   /// How much farther from its frames than for the sweeps an image shows the robot, m, of the variance that is expected, after `way`, m.
   void add_shift(double shift, double variance, double way);
 

@@ -106,5 +106,32 @@ TEST(CameraErrors, TheShareOfTheWayThatImagesGetWrongIsLearnt) {
   }
 }
 
+// Images along the way against a prior that is as certain as they are, at an iterate between the two: what is learnt is the images' share.
+TEST(CameraErrors, TheShareIsThatOfTheImageWhereverTheIterateIs) {
+  for (const double share : {0.0, 0.02}) {
+    CameraErrors errors(tiny::Scene::mount().T_imu_camera);
+    std::mt19937 random(13);
+    std::normal_distribution<double> normal(0, 1);
+    constexpr double sigma = 0.001;  // m, of the image and of the prior
+    const Eigen::Vector3d way(0.4, 0, 0);
+    for (int i = 0; i < 300; ++i) {
+      Estimate prior;
+      prior.x.p = {sigma * normal(random), 0, 0};
+      prior.P.diagonal().setConstant(1e-14);
+      prior.P(at::p, at::p) = sigma * sigma;
+      const double seen = sigma * normal(random) + share * way.x() * normal(random);
+      State x = prior.x;
+      x.p.x() = 0.5 * (prior.x.p.x() + seen);
+      Information<7> info;
+      info.A.setIdentity();
+      info.A /= sigma * sigma;
+      info.b.setZero();
+      info.b[3] = (x.p.x() - seen) / (sigma * sigma);
+      errors.add_way(info, x, prior, way);
+    }
+    EXPECT_NEAR(std::sqrt(errors.way_variance()), share, 0.003);
+  }
+}
+
 }  // namespace camera_errors_test
 }  // namespace kilvo

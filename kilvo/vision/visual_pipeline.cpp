@@ -180,16 +180,7 @@ void VisualPipeline::learn_errors(const Work& work) {
   if (!carries_estimate(work.model.report())) return;
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
   for (const EarlierView& view : views_of(work, work.at.p)) way += view.weight * view.way;
-  const Eigen::Vector3d along = way.normalized();
-  const double known = along.dot(work.info.A.block<3, 3>(3, 3) * along);
-  if (!(known > 0)) return;
-  // The row of the image's equations A (x - x0) + b = 0 along the way, of (rotation, position, exposure).
-  const Eigen::Matrix<double, 7, 1> row = work.info.A.middleRows<3>(3).transpose() * along / known;
-  Eigen::Matrix<double, 7, 1> from_prior;
-  from_prior << boxminus(work.at, work.prior.x).head<6>(), work.at.tau - work.prior.x.tau;
-  const double shift = row.dot(from_prior) - along.dot(work.info.b.segment<3>(3)) / known;
-  const double variance = row.head<6>().dot(P.topLeftCorner<6, 6>() * row.head<6>()) + row[6] * row[6] * P(at::tau, at::tau);
-  errors_.add_shift(shift, 1 / known + variance, way.norm());
+  errors_.add_way(work.info, work.at, work.prior, way);
 }
 
 // Patches are found within some pixels of where they are expected. Along what the LiDAR does not measure the position is from the images:
