@@ -20,9 +20,9 @@ constexpr int enough = 20, one_in = 5;
 constexpr double usual_depth = 3;  // m, of patches
 
 // Fewer patches, or a smaller share of those that should be seen, do not carry an estimate.
-bool carries_estimate(const PhotometricModel::Report& report) {
+bool carries_estimate(const PhotometricModel::Report& report, int share = one_in) {
   constexpr int fewest = 10;
-  return report.used >= fewest && one_in * report.used >= report.tracks - report.saturated;
+  return report.used >= fewest && share * report.used >= report.tracks - report.saturated;
 }
 
 bool is_new_view(const PatchCandidate& track) {
@@ -127,12 +127,13 @@ VisualRegistration VisualPipeline::measure(const CameraImage& image, const Image
     return out;
   }
   out.used = model.report().used;
-  out.carries = carries_estimate(model.report());
-  // A few patches among many may fit anywhere.
-  if (!out.carries) work->posterior = work->prior;
+  // A few patches among many may fit anywhere. Nor is a camera in use of which most are missed.
+  if (!carries_estimate(model.report())) work->posterior = work->prior;
+  out.carries = carries_estimate(model.report(), 2);
   out.posterior = work->posterior;
   out.T_WI = as_the_map_has_it(work->prior.x, out.posterior.x, context.unobservable);
-  if (!context.unobservable.isZero(0) && !context.feet_hold && out.carries) out.drift = views_of(*work, out.posterior.x.p);
+  if (!context.unobservable.isZero(0) && !context.feet_hold && carries_estimate(model.report()))
+    out.drift = views_of(*work, out.posterior.x.p);
   work_ = std::move(work);
   return out;
 }
