@@ -41,8 +41,7 @@ class Findings {
   void report_clock_steps(const Situation& now, const ClockSteps& steps);
   /// A sensor's clock was found to be off the IMU's: `total` s is added to its stamps from now on, beside the `configured` ones.
   void report_clock_offset(const Situation& now, Sensor s, double total, double configured);
-  /// The camera seems to be turned by `turned` rad about the axes of the IMU against its description; `corrected`: its rotation from now
-  /// on.
+  /// The camera is turned by `turned` rad about the IMU's axes against its description; `corrected`: its rotation from now on.
   void report_turned_camera(const Situation& now, const Eigen::Vector3d& turned, const std::optional<SO3>& corrected);
   /// No sweep had fitted for so long that the map was restarted.
   void report_new_map(const Situation& now);

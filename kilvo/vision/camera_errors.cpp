@@ -8,8 +8,7 @@ namespace {
 // Of a turn (rad) and of a share of the way: an image that is expected to be off by as much for other reasons counts a quarter.
 constexpr double small_turn = 5e-4, small_share = 5e-3;
 
-// `excess`: of a squared error over `expected`. An image counts as far as it knows more of the variance than that, and one alone proves
-// little.
+// `excess`: of a squared error over `expected`. An image counts as far as it knows more of the variance than that, one alone little.
 void learn(double excess, double expected, double small, RunningStatistics& variance) {
   constexpr double surprising = 10;
   const double known = std::max(0.0, variance.mean()) + small * small, all = known + expected;

@@ -19,11 +19,14 @@ namespace {
 constexpr int enough = 20, one_in = 5;
 constexpr double usual_depth = 3;  // m, of patches
 
-// Fewer patches, or a smaller share of those that should be seen, do not carry an estimate.
-bool carries_estimate(const PhotometricModel::Report& report, int share = one_in) {
+// Fewer patches, or a smaller share of those that should be seen, may fit anywhere.
+bool measures_pose(const PhotometricModel::Report& report) {
   constexpr int fewest = 10;
-  return report.used >= fewest && share * report.used >= report.tracks - report.saturated;
+  return report.used >= fewest && one_in * report.used >= report.tracks - report.saturated;
 }
+
+// A camera of which most patches are missed is described wrongly, or sees another world.
+bool finds_most(const PhotometricModel::Report& report) { return 2 * report.used >= report.tracks - report.saturated; }
 
 bool is_new_view(const PatchCandidate& track) {
   const double octaves = 0.5 * std::abs(std::log2(std::max(1e-6, std::abs(track.warp.A.determinant()))));
@@ -127,13 +130,12 @@ VisualRegistration VisualPipeline::measure(const CameraImage& image, const Image
     return out;
   }
   out.used = model.report().used;
-  // A few patches among many may fit anywhere. Nor is a camera in use of which most are missed.
-  if (!carries_estimate(model.report())) work->posterior = work->prior;
-  out.carries = carries_estimate(model.report(), 2);
+  const bool measured = measures_pose(model.report());
+  if (!measured) work->posterior = work->prior;
+  out.carries = measured && finds_most(model.report());
   out.posterior = work->posterior;
   out.T_WI = as_the_map_has_it(work->prior.x, out.posterior.x, context.unobservable);
-  if (!context.unobservable.isZero(0) && !context.feet_hold && carries_estimate(model.report()))
-    out.drift = views_of(*work, out.posterior.x.p);
+  if (!context.unobservable.isZero(0) && !context.feet_hold && measured) out.drift = views_of(*work, out.posterior.x.p);
   work_ = std::move(work);
   return out;
 }
@@ -178,7 +180,7 @@ void VisualPipeline::learn_errors(const Work& work) {
   const Covariance& P = work.prior.P;
   const double turned = P.topLeftCorner<3, 3>().trace(), moved = P.block<3, 3>(at::p, at::p).trace();
   errors_.add_turns({work.prior.x.R, work.omega}, map_, work.model.turns(), 2 * (turned + moved / (usual_depth * usual_depth)));
-  if (!carries_estimate(work.model.report())) return;
+  if (!measures_pose(work.model.report())) return;
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
   for (const EarlierView& view : views_of(work, work.at.p)) way += view.weight * view.way;
   errors_.add_way(work.info, work.at, work.prior, way);

@@ -40,7 +40,7 @@ struct VisualRegistration {
   Estimate posterior;             // of the prior's time; of a refused image the prior, unless it is not finite
   SE3 T_WI;                       // where the image's patches are kept, see VisualPipeline::learn
   int used = 0;                   // patches that were found as they were
-  bool carries = false;           // so many that they carry the estimate
+  bool carries = false;           // they measure the pose and are most of those that should be: the camera is in use
   /// Along what no sweep measures the pose has the errors of the frames that it was compared with, as given to learn().
   std::vector<EarlierView> drift;
 };
