@@ -45,7 +45,7 @@ class Findings {
   void report_turned_camera(const Situation& now, const Eigen::Vector3d& turned, const std::optional<SO3>& corrected);
   /// No sweep had fitted for so long that the map was restarted.
   void report_new_map(const Situation& now);
-  /// A sweep was registered. `along`: a direction of the position that neither it nor another sensor measured, none if all are.
+  /// A sweep or an image was registered. `along`: a direction of the position that no sensor measured, none if all are.
   void note_unmeasured(const Situation& now, const std::optional<Eigen::Vector3d>& along);
   /// `a` and `b` contradict each other.
   void contradict(Reason reason, Sensor a, Sensor b, double value, const std::string& why, const Situation& now);

@@ -47,7 +47,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   history_.record_from(prior, end);
   if (!lidar_.has_shape(end, prior)) return findings_.drop(Sensor::lidar, Reason::before_motion);
   Statistics& statistics = findings_.statistics();
-  const bool first = map_.surfaces().empty(), without_legs = !status_.has_legs(), sees = has_camera(status_.modality());
+  const bool first = map_.surfaces().empty(), without_legs = !status_.has_legs();
   const Registration sweep =
       map_.register_sweep(lidar_, scan, end, without_legs, history_, prior, legs_.description_error(prior.x), statistics.points);
   statistics.searches += sweep.searched ? 1 : 0;
@@ -78,7 +78,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
                                     input_.robot().lidar.time_offset);
     history_.correct_trajectory(sweep.posterior, sweep.posterior.x.v - prior.x.v);
     lidar_.accept(sweep);
-    findings_.note_unmeasured(situation(), without_legs && !sees ? direction_of(lidar_.unobservable()) : std::nullopt);
+    findings_.note_unmeasured(situation(), without_legs ? direction_of(lidar_.unobservable()) : std::nullopt);
     if (!first && sweep.carries) history_.correlate_with_sweep(end, prior, sweep.posterior, without_legs, lidar_.is_blind_somewhere());
     if (first) map_.begin_at(T_WI, legs_.description_error(sweep.posterior.x));
     if (first && moving_start_) map_.begin_at(T_WI, moving_start_->error_at(T_WI));
@@ -140,6 +140,7 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
   if (seen.refused) return refuse(*seen.refused);
   findings_.use(Sensor::camera);
   history_.correct_trajectory(seen.posterior, seen.posterior.x.v - context.prior.x.v);
+  if (!seen.drift.empty()) findings_.note_unmeasured(situation(), std::nullopt);
   map_.held_against(seen.posterior.x.pose(), seen.drift, context.unobservable);
   Output result;
   result.coloured = vision_->learn(map_.surfaces(), map_.error().total(seen.T_WI, seen.posterior.P.topLeftCorner<6, 6>()));
