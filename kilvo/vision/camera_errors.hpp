@@ -24,7 +24,7 @@ class CameraErrors {
   /// As described, but for what was corrected since.
   const SE3& T_CI() const { return T_CI_; }
 
-  /// The turns of the body that an image shows against the frames of `map`. `expected`: variance of the held rotation, about all axes.
+  /// The turns of the body that an image shows against the frames of `map`. `expected`: variance of the prior's part, all axes.
   void add_turns(const MountCheck::View& image, const VisualMap& map, std::span<const ImageTurn> turns, double expected);
   /// An image measures `info` at the iterate `x`, where sweeps hold `prior`; `way`: from its frames, m.
   void add_way(const Information<7>& info, const State& x, const Estimate& prior, const Eigen::Vector3d& way);
@@ -35,7 +35,7 @@ class CameraErrors {
   double turn_variance() const { return std::max(0.0, turn_.mean()); }
   /// Of the error of the distance from earlier images, per distance^2; the same for images in a row.
   double way_variance() const { return std::max(0.0, way_.mean()); }
-  /// `e` where the image may be turned.
+  /// `e` with the variance of that turn in that of its rotation.
   Estimate with_turn(Estimate e) const;
   /// Of the images' innovations, beyond that.
   InnovationScale& excess() { return excess_; }
