@@ -41,13 +41,18 @@ Estimate History::record_from(const Estimate& e, Time until) {
 
 std::optional<History> History::doubted(Time middle, Time end, std::optional<double> off) const {
   constexpr double most = 0.5;  // m/s, with which a sweep still has its shape
-  const double since = to_seconds(middle - base_.t), sigma = off.value_or(0) / since;
+  // What pushed the robot may have done so before the base, if that is an image: since the last sweep.
+  const double before = to_seconds(std::clamp(base_.t - swept_, Duration::zero(), longest_correction));
+  const double since = to_seconds(middle - base_.t), sigma = off.value_or(0) / (before + since);
   if (end - base_.t > longest_correction || since <= 0 || sigma > most) return std::nullopt;
   std::optional<History> out(*this);
   if (!off) {
     out->replay_.doubt_acceleration(base_);
   } else {
-    out->base_.P.diagonal().segment<3>(at::v).array() += sigma * sigma;
+    Eigen::Matrix<double, at::size, 3> moved = Eigen::Matrix<double, at::size, 3>::Zero();
+    moved.middleRows<3>(at::p).diagonal().setConstant(sigma * before);
+    moved.middleRows<3>(at::v).diagonal().setConstant(sigma);
+    out->base_.P += moved * moved.transpose();
     out->replay_.forget_estimates();
   }
   return out;
@@ -94,6 +99,7 @@ void History::rebase_to_closed() {
 }
 
 void History::correlate_with_sweep(Time end, const Estimate& prior, const Estimate& posterior, bool without_legs, bool open) {
+  swept_ = posterior.t;
   replay_.correlate_with_sweep(end, shared_with_sweep<at::R>(prior, posterior), shared_with_sweep<at::p>(prior, posterior));
   const double expected = (prior.P.diagonal() - posterior.P.diagonal()).segment<3>(at::v).sum();
   if (expected > 0) replay_.learn_accel_noise(without_legs ? (posterior.x.v - prior.x.v).squaredNorm() / expected : 0, open);

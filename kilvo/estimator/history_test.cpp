@@ -139,6 +139,26 @@ TEST(History, ACorrectionIsNoMotionOfTheTrajectory) {
   EXPECT_NEAR((slower.p - (early.inverse() * late).p).norm(), 0.07, 0.02);
 }
 
+// Images between two sweeps are the base soon before the second one: a push that the sweep shows came with the velocity of 100 ms, not
+// of 10.
+TEST(History, ASweepThatIsOffIsDoubtedSinceTheSweepBeforeNotSinceTheImageBetween) {
+  History history{EstimatorConfig{}};
+  history.begin(first_estimate(), std::nullopt);
+  play(history, 0, 200);
+  const Time middle = history_start + milliseconds(150);
+  const Estimate at_sweep = history.at(middle - milliseconds(100));
+  history.correlate_with_sweep(at_sweep.t + milliseconds(50), at_sweep, at_sweep, true, false);
+  history.rebase(history.at(middle - milliseconds(10)));
+  constexpr double off = 0.01;
+  auto doubted = history.doubted(middle, middle + milliseconds(50), off);
+  ASSERT_TRUE(doubted);
+  const Covariance more = doubted->at(middle).P - history.at(middle).P;
+  for (const int axis : {0, 1, 2}) {
+    EXPECT_NEAR(std::sqrt(more(at::p + axis, at::p + axis)), off, 1e-6);
+    EXPECT_NEAR(std::sqrt(more(at::v + axis, at::v + axis)), off / 0.1, 1e-5);
+  }
+}
+
 TEST(History, HowTheImuMovedIsKnownFromShortlyBeforeTheBase) {
   History history{EstimatorConfig{}};
   history.begin(first_estimate(), std::nullopt);
