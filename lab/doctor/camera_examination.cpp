@@ -11,6 +11,8 @@ namespace {
 constexpr double camera_rotation_tolerance = 2;    // degrees
 constexpr double focal_tolerance = 0.035;          // of the focal length; on rough walks a right one was 2.2 % off
 constexpr double camera_clock_tolerance = 0.0045;  // s
+// What is wrong leaves the corners farther from their lines: what is right in its place leaves less than this share of it.
+constexpr double better = 0.95;
 
 Eigen::Vector3d rotation_sigma(const CameraFit& fit) { return {fit.fit.sigma(0), fit.fit.sigma(1), fit.fit.sigma(2)}; }
 
@@ -20,6 +22,7 @@ Eigen::Vector3d position_sigma(const CameraFit& placed) { return {placed.fit.sig
 // was 7 cm off, by 6 standard deviations of the scatter. The right place brings the corners to their lines.
 Eigen::Vector3d off_place(const CameraFit& fit, const CameraFit& placed, const Eigen::Vector3d& described) {
   constexpr double tolerance = 0.05, tolerance_if_explained = 0.03, explained = 0.85, sure_of_position = 5;  // m, m, -, -
+  if (!(placed.error < better * fit.error)) return Eigen::Vector3d::Zero();
   const double least = placed.error < explained * fit.error ? tolerance_if_explained : tolerance;
   Eigen::Vector3d out = placed.p_IC - described;
   for (int i = 0; i < 3; ++i) {
@@ -28,8 +31,10 @@ Eigen::Vector3d off_place(const CameraFit& fit, const CameraFit& placed, const E
   return out;
 }
 
-bool is_turned(const CameraFit& fit) {
-  return degrees(fit.fit.x.head<3>().norm()) > std::max(camera_rotation_tolerance, sure * degrees(rotation_sigma(fit).norm()));
+// `unturned`: the same fit with the described rotation.
+bool is_turned(const CameraFit& fit, const CameraFit& unturned) {
+  return fit.error < better * unturned.error &&
+         degrees(fit.fit.x.head<3>().norm()) > std::max(camera_rotation_tolerance, sure * degrees(rotation_sigma(fit).norm()));
 }
 
 }  // namespace
@@ -151,7 +156,8 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
   const double focal_sigma = fit.fit.sigma(3);
   const bool refocused = std::abs(fit.fit.x[3]) > std::max(focal_tolerance, sure * focal_sigma);
   const bool moved = !lidar_way().empty() && placed.fit.good;
-  const bool off = is_turned(fit) || refocused || (moved && !off_place(fit, placed, robot_.camera.T_imu_camera.p).isZero(0));
+  const bool turned = is_turned(fit, tracks.fit_unturned({robot_.camera, 0}));
+  const bool off = turned || refocused || (moved && !off_place(fit, placed, robot_.camera.T_imu_camera.p).isZero(0));
   if (off && examine_lens(tracks, moved ? std::min(fit.error, placed.error) : fit.error)) return;
   if (moved && examine_camera_position(tracks, fit, placed)) return;
   const SO3 before = robot_.camera.T_imu_camera.R;
@@ -162,7 +168,7 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
                {"camera.fy", fmt::format("{:.3f}", (1 + r.taken[0]) * robot_.camera.fy)}};
   refinements_.push_back(std::move(r));
   refine_offset(Sensor::camera, fit.offset, fit.fit.sigma(4), clock_method);
-  if (is_turned(fit)) {
+  if (turned) {
     std::erase_if(diagnosis_.findings, [](const Finding& x) { return x.cause == "camera_rotation"; });
     accuse_camera_rotation(fit.R_IC, rotation);
   } else {

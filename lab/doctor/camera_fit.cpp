@@ -198,7 +198,8 @@ CameraFit CameraTracks::fit(const CameraGuess& guess, const Free& free) const {
   const int parameters = free.position ? 8 : free.lens ? 10 : 5;
   Eigen::VectorXd start = Eigen::VectorXd::Zero(parameters), prior = Eigen::VectorXd::Ones(parameters),
                   step = Eigen::VectorXd::Constant(parameters, 1e-3);
-  prior.head<5>() << INFINITY, INFINITY, INFINITY, free.focal ? 1.0 : 1e-6, free.offset ? 1.0 : 1e-7;
+  const double turn = free.rotation ? INFINITY : 1e-6;
+  prior.head<5>() << turn, turn, turn, free.focal ? 1.0 : 1e-6, free.offset ? 1.0 : 1e-7;
   step[4] = 5e-4;
   if (free.lens) prior.tail<5>() << lens_prior, lens_prior, lens_prior, 1, 1;
   try {

@@ -56,6 +56,8 @@ class CameraTracks {
   /// px: robust distance from the epipolar lines under a guess; infinite when it cannot be judged.
   double error(const CameraGuess& guess) const;
   CameraFit fit(const CameraGuess& guess, bool with_focal, bool with_offset) const;
+  /// Of focal length and offset alone.
+  CameraFit fit_unturned(const CameraGuess& guess) const { return fit(guess, {true, true, false, false, false}); }
   /// Of all of it, the position included: the camera turns with the robot, and so goes a way of its own. Only the LiDAR's way shows that.
   CameraFit fit_with_position(const CameraGuess& guess) const;
   /// Of all of it but the position, with the lens: principal point, fy against fx and radial distortion.
@@ -67,7 +69,7 @@ class CameraTracks {
 
  private:
   struct Free {
-    bool focal, offset, position, lens = false;
+    bool focal, offset, position, lens = false, rotation = true;
   };
   CameraFit fit(const CameraGuess& guess, const Free& free) const;
   void residuals(const CameraGuess& guess, const std::vector<std::vector<Eigen::Vector4d>>& rays, const SE3& T_IC, double focal,

@@ -136,6 +136,13 @@ TEST(CameraTracks, FindWhereTheCameraIs) {
     EXPECT_NEAR(fit.mount.distortion[0], 0, 0.02) << lens[3];
     EXPECT_LT(fit.error, 0.95 * std::min(tracks.fit({described, 0}, true, true).error, tracks.fit_with_position({described, 0}).error));
   }
+  CameraMount turned_mount = mount;
+  turned_mount.T_imu_camera.R = mount.T_imu_camera.R * SO3::Exp(0.04 * Eigen::Vector3d::UnitX());
+  const CameraFit unturned = tracks.fit_unturned({turned_mount, 0});
+  EXPECT_LT((unturned.R_IC.inverse() * turned_mount.T_imu_camera.R).Log().norm(), 1e-4);
+  EXPECT_LT(tracks.fit({turned_mount, 0}, true, true).error, 0.5 * unturned.error);
+  const CameraFit right = tracks.fit_unturned({mount, 0});
+  EXPECT_GT(tracks.fit({mount, 0}, true, true).error, 0.95 * right.error) << "no other rotation explains more than the right one";
   CameraMount longer = mount;
   longer.fx *= 1.2, longer.fy *= 1.2;
   EXPECT_NEAR(tracks.fit_with_position({longer, 0}).focal, 1 / 1.2, 0.005);
