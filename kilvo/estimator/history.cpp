@@ -49,9 +49,8 @@ std::optional<History> History::doubted(Time middle, Time end, std::optional<dou
   if (!off) {
     out->replay_.doubt_acceleration(base_);
   } else {
-    Eigen::Matrix<double, at::size, 3> moved = Eigen::Matrix<double, at::size, 3>::Zero();
+    Eigen::Matrix<double, at::size, 3> moved = sigma * Covariance::Identity().middleCols<3>(at::v);
     moved.middleRows<3>(at::p).diagonal().setConstant(sigma * before);
-    moved.middleRows<3>(at::v).diagonal().setConstant(sigma);
     out->base_.P += moved * moved.transpose();
     out->replay_.forget_estimates();
   }

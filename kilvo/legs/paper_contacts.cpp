@@ -76,7 +76,7 @@ void PaperContactEstimator::learn(std::size_t side, const Residual& r) {
 }
 
 PaperContactEstimator::Residual PaperContactEstimator::row_scale(const Residual& r) const {
-  if (!initialised() || swing_.residual.count() == 0) return Residual::Ones();
+  if (!swing_time_ || swing_.residual.count() == 0) return Residual::Ones();
   // As printed (d / max d) a row without deviation would have no noise at all, and the largest always alpha_s.
   return (swing_.residual.deviation(r, least_residual) / unusual_deviation).cwiseMax(1.0).cwiseMin(largest_scale);
 }
@@ -89,7 +89,7 @@ void PaperContactEstimator::lift_off(std::size_t side, Time t) {
   f.slow.reset();
   contacts_.on[side] = false;
   contacts_.since[side] = t;
-  if (initialised()) return;
+  if (swing_time_) return;
   first_swing_ = side;
   learning_ = {};
 }
@@ -152,7 +152,7 @@ const Contacts& PaperContactEstimator::update(const Feet& feet, const State& x, 
   const bool still = record_still_start(feet.t, accel, motion);
   record_first_swing(accel, motion);
 
-  const Reference& reference = initialised() ? swing_ : static_;
+  const Reference& reference = swing_time_ ? swing_ : static_;
   contacts_.d_a = reference.accel.deviation(accel, least_accel).sum();  // Eq. 19
   const bool impact = impact_.update(contacts_.d_a > unusual_deviation, feet.t);
   for (std::size_t side = 0; side < 2; ++side) {
@@ -165,9 +165,9 @@ const Contacts& PaperContactEstimator::update(const Feet& feet, const State& x, 
     contacts_.ground[side] = f.ground;
     if (still) continue;
     if (contacts_.on[side]) {
-      f.settled = f.settled || f.calm.update(contacts_.d_a < unusual_deviation, feet.t) || !initialised();
+      f.settled = f.settled || f.calm.update(contacts_.d_a < unusual_deviation, feet.t) || !swing_time_;
       // In the first step one foot supports: what it does meanwhile is S_sw.
-      const bool may_lift = f.settled && (initialised() || contacts_.on[1 - side]);
+      const bool may_lift = f.settled && (swing_time_ || contacts_.on[1 - side]);
       if (f.moving.update(d_fv > unusual_deviation, feet.t) && may_lift) lift_off(side, feet.t);
     } else if (lands(side, impact, d_fv, feet.t)) {
       touchdown(side, feet.t, m, x, map);

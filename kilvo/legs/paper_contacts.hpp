@@ -49,10 +49,8 @@ class PaperContactEstimator {
   /// The ground that earlier contacts span under the contact of this foot; nothing before there were three.
   const std::optional<GroundPatch>& contact_patch(std::size_t side) const { return foot_[side].contact_patch; }
 
-  /// Swing time and S_sw are known: the first step has been completed.
-  bool initialised() const { return swing_time_.has_value(); }
-  /// Delta t_sw, s; 0 before it is known.
-  double swing_time() const { return swing_time_ ? to_seconds(*swing_time_) : 0; }
+  /// Delta t_sw, known with S_sw: the first step has been completed.
+  std::optional<Duration> swing_time() const { return swing_time_; }
 
  private:
   /// S_st or S_sw: of the acceleration, of the velocity of a supporting foot and of its residual.

@@ -108,8 +108,6 @@ Degeneracy find_degeneracy(const SweepInformation& sweep, double weak_share, con
   return out;
 }
 
-Matrix6 weak_part(const Degeneracy& d) { return weak_part(d, {1, 1, 1, 1, 1, 1}); }
-
 Matrix6 weak_part(const Degeneracy& d, const std::array<double, 6>& share) {
   const Vector6 metres = to_metres(d.lever);
   Matrix6 sum = Matrix6::Zero();

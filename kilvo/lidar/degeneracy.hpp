@@ -64,11 +64,8 @@ class BlindDirections {
 Degeneracy find_degeneracy(const SweepInformation& sweep, double weak_share, const BlindDirections& before);
 
 /// Takes a pose error (rotation, position) to its part along the weak directions; the transpose of what is left of the identity takes
-/// the weak directions out of an information: A -> K A K', K = (I - W)'.
-PoseCovariance weak_part(const Degeneracy& degeneracy);
-
-/// The same for each direction by itself, times `share`.
-PoseCovariance weak_part(const Degeneracy& degeneracy, const std::array<double, 6>& share);
+/// the weak directions out of an information: A -> K A K', K = (I - W)'. Each direction by itself, times `share`.
+PoseCovariance weak_part(const Degeneracy& degeneracy, const std::array<double, 6>& share = {1, 1, 1, 1, 1, 1});
 
 /// The information along each weak direction, 1/m^2.
 std::array<double, 6> along_weak(const Degeneracy& degeneracy, const PoseCovariance& A);
