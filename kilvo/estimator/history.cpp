@@ -42,9 +42,9 @@ Estimate History::record_from(const Estimate& e, Time until) {
 std::optional<History> History::doubted(Time middle, Time end, std::optional<double> off) const {
   constexpr double most = 0.5;  // m/s, with which a sweep still has its shape
   // What pushed the robot may have done so before the base, if that is an image: since the last sweep.
-  const double before = to_seconds(std::clamp(base_.t - swept_, Duration::zero(), longest_correction));
+  const double before = swept_ ? std::max(0.0, to_seconds(base_.t - *swept_)) : 0;
   const double since = to_seconds(middle - base_.t), sigma = off.value_or(0) / (before + since);
-  if (end - base_.t > longest_correction || since <= 0 || sigma > most) return std::nullopt;
+  if (to_seconds(end - base_.t) + before > to_seconds(longest_correction) || !(before + since > 0) || sigma > most) return std::nullopt;
   std::optional<History> out(*this);
   if (!off) {
     out->replay_.doubt_acceleration(base_);

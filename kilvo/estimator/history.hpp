@@ -33,8 +33,8 @@ class History {
   /// The estimate of a time not before the base. The poses up to then are in the trajectory.
   Estimate at(Time t) { return record_from(base_, t); }
   /// For a sweep around `middle` until `end`: a history that does not trust the accelerometer since the base; or, if the sweep is `off` by
-  /// so much (m), one whose velocity is less certain since the last sweep. None when it is too long ago, or too much. now() and closed()
-  /// stay.
+  /// so much (m), one whose velocity since the last sweep is less certain, and so the position. None when it is too long ago, or too much.
+  /// now() and closed() stay.
   std::optional<History> doubted(Time middle, Time end, std::optional<double> off) const;
   /// The estimate at `until` if it was `e` before. The poses in between are in the trajectory.
   Estimate record_from(const Estimate& e, Time until);
@@ -98,8 +98,8 @@ class History {
 
   Replay replay_;
   Estimate base_, closed_, now_;
-  Estimate good_;  // the last plausible closed_
-  Time swept_{};   // of the last sweep that was used
+  Estimate good_;              // the last plausible closed_
+  std::optional<Time> swept_;  // see correlate_with_sweep
   Trajectory trajectory_;
   double closing_us_ = 0;
   bool begun_ = false, is_fork_ = false;

@@ -157,6 +157,20 @@ TEST(History, ASweepThatIsOffIsDoubtedSinceTheSweepBeforeNotSinceTheImageBetween
     EXPECT_NEAR(std::sqrt(more(at::p + axis, at::p + axis)), off, 1e-6);
     EXPECT_NEAR(std::sqrt(more(at::v + axis, at::v + axis)), off / 0.1, 1e-5);
   }
+  EXPECT_FALSE(history.doubted(middle, middle + milliseconds(251), off)) << "more than 0.3 s after the sweep before";
+}
+
+TEST(History, BeforeAnySweepIsUsedAPushIsDoubtedSinceTheBase) {
+  History history{EstimatorConfig{}};
+  history.begin(first_estimate(), std::nullopt);
+  play(history, 0, 200);
+  const Time middle = history_start + milliseconds(150);
+  history.rebase(history.at(middle - milliseconds(50)));
+  auto doubted = history.doubted(middle, middle + milliseconds(50), 0.01);
+  ASSERT_TRUE(doubted);
+  const Covariance more = doubted->base().P - history.base().P;
+  EXPECT_TRUE((more.topLeftCorner<6, 6>().isZero(0)));
+  EXPECT_NEAR(more(at::v, at::v), 0.2 * 0.2, 1e-9);
 }
 
 TEST(History, HowTheImuMovedIsKnownFromShortlyBeforeTheBase) {

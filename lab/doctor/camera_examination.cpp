@@ -11,8 +11,6 @@ namespace {
 constexpr double camera_rotation_tolerance = 2;    // degrees
 constexpr double focal_tolerance = 0.035;          // of the focal length; on rough walks a right one was 2.2 % off
 constexpr double camera_clock_tolerance = 0.0045;  // s
-// What is wrong leaves the corners farther from their lines: what is right in its place leaves less than this share of it.
-constexpr double better = 0.95;
 
 Eigen::Vector3d rotation_sigma(const CameraFit& fit) { return {fit.fit.sigma(0), fit.fit.sigma(1), fit.fit.sigma(2)}; }
 
@@ -22,7 +20,6 @@ Eigen::Vector3d position_sigma(const CameraFit& placed) { return {placed.fit.sig
 // was 7 cm off, by 6 standard deviations of the scatter. The right place brings the corners to their lines.
 Eigen::Vector3d off_place(const CameraFit& fit, const CameraFit& placed, const Eigen::Vector3d& described) {
   constexpr double tolerance = 0.05, tolerance_if_explained = 0.03, explained = 0.85, sure_of_position = 5;  // m, m, -, -
-  if (!(placed.error < better * fit.error)) return Eigen::Vector3d::Zero();
   const double least = placed.error < explained * fit.error ? tolerance_if_explained : tolerance;
   Eigen::Vector3d out = placed.p_IC - described;
   for (int i = 0; i < 3; ++i) {
@@ -31,10 +28,14 @@ Eigen::Vector3d off_place(const CameraFit& fit, const CameraFit& placed, const E
   return out;
 }
 
-// `unturned`: the same fit with the described rotation.
-bool is_turned(const CameraFit& fit, const CameraFit& unturned) {
-  return fit.error < better * unturned.error &&
-         degrees(fit.fit.x.head<3>().norm()) > std::max(camera_rotation_tolerance, sure * degrees(rotation_sigma(fit).norm()));
+bool looks_turned(const CameraFit& fit) {
+  return degrees(fit.fit.x.head<3>().norm()) > std::max(camera_rotation_tolerance, sure * degrees(rotation_sigma(fit).norm()));
+}
+
+// What is wrong leaves the corners farther from their lines: what is right in its place leaves less than this share of it.
+bool explains(const CameraFit& other, const CameraFit& described) {
+  constexpr double better = 0.95;
+  return !described.fit.good || other.error < better * described.error;
 }
 
 }  // namespace
@@ -118,6 +119,10 @@ bool Examination::examine_camera_position(const CameraTracks& tracks, const Came
   }
   const bool found_before = std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "camera_position"; });
   if (found_before || seems_wrong(Sensor::lidar)) return false;
+  if (!explains(placed, fit)) {
+    check(Sensor::camera, "position of the mount", Check::Verdict::unknown, detail + "; the images fit the described one as well");
+    return false;
+  }
   Eigen::Vector3d right = described;
   for (int i = 0; i < 3; ++i) {
     if (off[i] != 0) right[i] = std::round(1e3 * placed.p_IC[i]) / 1e3;
@@ -156,13 +161,17 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
   const double focal_sigma = fit.fit.sigma(3);
   const bool refocused = std::abs(fit.fit.x[3]) > std::max(focal_tolerance, sure * focal_sigma);
   const bool moved = !lidar_way().empty() && placed.fit.good;
-  const bool turned = is_turned(fit, tracks.fit_unturned({robot_.camera, 0}));
-  const bool off = turned || refocused || (moved && !off_place(fit, placed, robot_.camera.T_imu_camera.p).isZero(0));
-  if (off && examine_lens(tracks, moved ? std::min(fit.error, placed.error) : fit.error)) return;
+  const bool seems_turned = looks_turned(fit), turned = seems_turned && explains(fit, tracks.fit_unturned({robot_.camera, 0}));
+  const bool seems_moved = moved && !off_place(fit, placed, robot_.camera.T_imu_camera.p).isZero(0);
+  // A camera that is turned or moved leaves 0.98 or more. Where neither explains anything it may be the lens, or nothing.
+  const double share = turned || refocused || (seems_moved && explains(placed, fit)) ? 0.95 : 0.85;
+  if ((seems_turned || refocused || seems_moved) && examine_lens(tracks, moved ? std::min(fit.error, placed.error) : fit.error, share))
+    return;
   if (moved && examine_camera_position(tracks, fit, placed)) return;
   const SO3 before = robot_.camera.T_imu_camera.R;
   constexpr double method = 0.08, focal_method = 0.0025, clock_method = 0.0002;  // degrees, of the focal length, s
-  refine_rotation(Sensor::camera, "rotation of the camera on the IMU", before, fit.R_IC, sigma, method, "camera.T_imu_camera.R");
+  if (turned || !seems_turned)
+    refine_rotation(Sensor::camera, "rotation of the camera on the IMU", before, fit.R_IC, sigma, method, "camera.T_imu_camera.R");
   Refinement r = refinement(Sensor::camera, "focal length", {fit.focal - 1}, {fit.fit.sigma(3)}, focal_method, 0.01, fmt::format("-"));
   r.changes = {{"camera.fx", fmt::format("{:.3f}", (1 + r.taken[0]) * robot_.camera.fx)},
                {"camera.fy", fmt::format("{:.3f}", (1 + r.taken[0]) * robot_.camera.fy)}};
@@ -172,7 +181,8 @@ void Examination::examine_camera_fit(const CameraTracks& tracks) {
     std::erase_if(diagnosis_.findings, [](const Finding& x) { return x.cause == "camera_rotation"; });
     accuse_camera_rotation(fit.R_IC, rotation);
   } else {
-    check(Sensor::camera, "rotation of the mount", uncertain > 2 ? Check::Verdict::unknown : Check::Verdict::good, rotation);
+    check(Sensor::camera, "rotation of the mount", uncertain > 2 || seems_turned ? Check::Verdict::unknown : Check::Verdict::good,
+          rotation);
   }
   const std::string focal = fmt::format("{:.4f} times the described one, standard deviation {:.4f}", fit.focal, focal_sigma);
   const auto holds = [&] {

@@ -31,14 +31,13 @@ struct LensChange {
 
 }  // namespace
 
-// `otherwise`: px, as close as the corners come to their lines without another lens.
-bool Examination::examine_lens(const CameraTracks& tracks, double otherwise) {
-  constexpr double better = 0.95;  // a camera that is turned or moved leaves 0.98 or more
+// `otherwise`: px, as close as the corners come to their lines without another lens; of that another one must leave less than this `share`.
+bool Examination::examine_lens(const CameraTracks& tracks, double otherwise, double share) {
   constexpr std::array causes{"camera_lens", "camera_principal_point", "camera_focal"};
   const auto of_lens = [&](const Finding& f) { return std::ranges::find(causes, f.cause) != causes.end(); };
   if (std::ranges::any_of(diagnosis_.findings, of_lens)) return false;
   const CameraFit fit = tracks.fit_with_lens({robot_.camera, 0});
-  if (!fit.fit.good || fit.error > better * otherwise) return false;
+  if (!fit.fit.good || fit.error > share * otherwise) return false;
   const CameraMount &was = robot_.camera, &is = fit.mount;
   const LensChange change(was, is);
   const double most = std::max({change.principal_point, change.focal, change.aspect, change.distortion});

@@ -171,7 +171,7 @@ class Examination {
   void accuse_camera_rotation(const SO3& R_IC, const std::string& evidence);
   bool examine_camera_position(const CameraTracks& tracks, const CameraFit& fit, const CameraFit& placed);
   // camera_lens.cpp
-  bool examine_lens(const CameraTracks& tracks, double otherwise);
+  bool examine_lens(const CameraTracks& tracks, double otherwise, double share);
 
   GyroPath gyro() const { return {recorded_.imu, gyro_axes_, gyro_bias_}; }
   SenseAgreement agreement(const std::vector<Turn>& turns, const SO3& mount, double least_explained) const;
