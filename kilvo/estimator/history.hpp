@@ -99,7 +99,7 @@ class History {
   Replay replay_;
   Estimate base_, closed_, now_;
   Estimate good_;              // the last plausible closed_
-  std::optional<Time> swept_;  // see correlate_with_sweep
+  std::optional<Time> swept_;  // middle of the last one that correlate_with_sweep() was given
   Trajectory trajectory_;
   double closing_us_ = 0;
   bool begun_ = false, is_fork_ = false;
