@@ -9,7 +9,7 @@
 namespace kilvo::node {
 namespace {
 
-bool is_measured(const LinkKinematics& link, const lab::Settings& settings) {
+bool is_measured(const lab::LinkKinematics& link, const lab::Settings& settings) {
   return link.is_rigid() || (settings.has(Sensor::legs) && settings.robot.legs.type == "joints");
 }
 
@@ -18,7 +18,7 @@ std::string usable_root(const lab::Settings& settings) {
   const Robot& robot = settings.robot;
   if (robot.urdf.empty() || robot.imu.link.empty()) return "";
   const std::string root = LinkTree(robot).root();
-  return is_measured(LinkKinematics(robot, root), settings) ? root : "";
+  return is_measured(lab::LinkKinematics(robot, root), settings) ? root : "";
 }
 
 std::string link_of(const Options& options, const lab::Settings& settings) {
@@ -30,7 +30,7 @@ std::string link_of(const Options& options, const lab::Settings& settings) {
     throw lab::ConfigError(fmt::format("base: {} has no link '{}', nearest is '{}'",
                                        settings.urdf_file.empty() ? "robot.urdf is not given, so it" : settings.urdf_file, link,
                                        lab::nearest(link, links)));
-  const LinkKinematics kinematics(settings.robot, link);
+  const lab::LinkKinematics kinematics(settings.robot, link);
   if (!is_measured(kinematics, settings))
     throw lab::ConfigError(
         fmt::format("base: nothing measures {}, which is between the IMU and '{}'; lock it in robot.locked_joints, "
@@ -47,7 +47,7 @@ BaseFrame::Place BaseFrame::place_of(const std::string& link, const lab::Setting
     out.newest.emplace();
     return out;
   }
-  LinkKinematics kinematics(settings.robot, link);
+  lab::LinkKinematics kinematics(settings.robot, link);
   if (kinematics.is_rigid()) {
     out.newest = kinematics.at_rest();
   } else {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "apps/node/options.hpp"
-#include "kilvo/legs/link_kinematics.hpp"
+#include "lab/clocks/link_kinematics.hpp"
 #include "lab/settings/settings.hpp"
 
 namespace kilvo::node {
@@ -26,7 +26,7 @@ class BaseFrame {
 
   /// Of the newest joints; nothing while they have not been measured.
   struct Motion {
-    LinkMotion base, tf;
+    lab::LinkMotion base, tf;
   };
   std::optional<Motion> newest() const;
   /// Which joints it waits for; empty when it does not.
@@ -34,8 +34,8 @@ class BaseFrame {
 
  private:
   struct Place {  // of a frame against the IMU; without kinematics it is the IMU itself, or fixed to it
-    std::optional<LinkKinematics> link;
-    std::optional<LinkMotion> newest;
+    std::optional<lab::LinkKinematics> link;
+    std::optional<lab::LinkMotion> newest;
     void take(const JointSample& sample);
   };
   static Place place_of(const std::string& link, const lab::Settings& settings);

@@ -35,7 +35,7 @@ TEST(BaseFrame, IsTheRootThroughTheMeasuredWaist) {
   frame.take(joints);
   ASSERT_TRUE(frame.newest());
   EXPECT_EQ(frame.waiting_for(), "");
-  EXPECT_LT((frame.newest()->base.T_IL.p - LinkKinematics(settings.robot, "pelvis").at(joints)->T_IL.p).norm(), 1e-15);
+  EXPECT_LT((frame.newest()->base.T_IL.p - lab::LinkKinematics(settings.robot, "pelvis").at(joints)->T_IL.p).norm(), 1e-15);
 }
 
 TEST(BaseFrame, TransformsNeverLeadToALinkBelowTheRoot) {

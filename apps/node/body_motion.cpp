@@ -45,7 +45,7 @@ bool BodyMotion::is_finite() const {
          twist_covariance.allFinite();
 }
 
-BodyMotion body_motion(const Output& output, const LinkMotion& base, double rate_variance) {
+BodyMotion body_motion(const Output& output, const lab::LinkMotion& base, double rate_variance) {
   const SE3& T_IB = base.T_IL;
   const Eigen::Vector3d v_I = output.x.R.inverse() * output.x.v;
   const SO3 R_BI = T_IB.R.inverse();

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 
 #include "kilvo/estimator/output.hpp"
-#include "kilvo/legs/link_kinematics.hpp"
 #include "kilvo/math/se3.hpp"
+#include "lab/clocks/link_kinematics.hpp"
 
 namespace kilvo::node {
 
@@ -22,7 +22,7 @@ struct BodyMotion {
 
 /// `base`: where it is, and how it moves, as the IMU sees it. `rate_variance`: of the white noise of the angular rate, each axis,
 /// (rad/s)^2.
-BodyMotion body_motion(const Output& output, const LinkMotion& base, double rate_variance);
+BodyMotion body_motion(const Output& output, const lab::LinkMotion& base, double rate_variance);
 
 /// The same seen from another world, in which the IMU's pose is `T_OI`: covariances are turned with it.
 BodyMotion seen_from(const BodyMotion& motion, const Output& output, const SE3& T_OI, const SE3& T_IB);

@@ -42,7 +42,7 @@ StatePublisher::StatePublisher(const Options& options, const lab::Settings& sett
 void StatePublisher::take(const Output& output) {
   if (!is_of_this_epoch(output)) return;
   const auto base = base_.newest();
-  BodyMotion best = body_motion(output, base ? base->base : LinkMotion{}, rate_variance_);
+  BodyMotion best = body_motion(output, base ? base->base : lab::LinkMotion{}, rate_variance_);
   if (!trusted_) {
     best.pose_covariance.diagonal().array() += unknown;
     best.twist_covariance.diagonal().array() += unknown;

@@ -68,8 +68,9 @@ KDL::Tree tree_of(const Robot& robot) {
   return tree;
 }
 
-// From the frame behind one joint to that behind the next.
-void pass(const ChainJoint& joint, double q, double dq, MovingFrame& frame) {
+// From the frame behind one joint to that behind the next, by the values of a message.
+void pass(const ChainJoint& joint, double value, double rate, MovingFrame& frame) {
+  const double q = joint.reading.scale * value + joint.reading.zero, dq = joint.reading.scale * rate;
   const Eigen::Vector3d arm = frame.R * joint.p;
   frame.p += arm;
   frame.v += frame.omega.cross(arm);
@@ -86,9 +87,10 @@ void pass(const ChainJoint& joint, double q, double dq, MovingFrame& frame) {
 
 struct LinkTree::Tree {
   KDL::Tree tree;
+  std::map<std::string, JointReading> readings;
 };
 
-LinkTree::LinkTree(const Robot& robot) : tree_(std::make_unique<Tree>(Tree{tree_of(robot)})) {}
+LinkTree::LinkTree(const Robot& robot) : tree_(std::make_unique<Tree>(Tree{tree_of(robot), robot.joints})) {}
 LinkTree::~LinkTree() = default;
 
 std::string LinkTree::root() const { return tree_->tree.getRootSegment()->first; }
@@ -118,7 +120,8 @@ JointChain LinkTree::chain(const std::string& from, const std::string& to) const
     next.sine = skew(next.axis) * next.R;
     next.versine = skew(next.axis) * next.sine;
     if (!moves) continue;
-    out.names.push_back(joint.getName());
+    if (const auto it = tree_->readings.find(joint.getName()); it != tree_->readings.end()) next.reading = it->second;
+    out.names.push_back(next.reading.from.empty() ? joint.getName() : next.reading.from);
     out.joints.push_back(next);
     next = ChainJoint{};
     next.p = turned.transpose() * (end - origin);

@@ -15,6 +15,7 @@ namespace kilvo {
 /// joint that turns by q makes that R + sin(q) sine + (1 - cos(q)) versine (Rodrigues).
 struct ChainJoint {
   bool turns = false, slides = false;  // neither: the rigid end of the chain
+  JointReading reading;
   Eigen::Vector3d axis = Eigen::Vector3d::Zero(), p = Eigen::Vector3d::Zero();
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity(), sine = Eigen::Matrix3d::Zero(), versine = Eigen::Matrix3d::Zero();
 };
@@ -27,7 +28,7 @@ struct MovingFrame {
 
 struct JointChain {
   std::vector<ChainJoint> joints;   // the moving ones and the end
-  std::vector<std::string> names;   // of the moving ones
+  std::vector<std::string> names;   // of the moving ones, in the messages
   std::vector<std::size_t> places;  // in the message, by joint
 
   /// Finds the joints in a message of these names; the first that is missing, if any.

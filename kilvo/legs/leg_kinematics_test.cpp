@@ -160,6 +160,31 @@ TEST(LegKinematics, ALockedJointStaysAtZeroWhateverTheMessageSays) {
   EXPECT_LT(distance(with, feet_of(locked, s)), 1e-12) << "it need not be in the message";
 }
 
+TEST(LegKinematics, AReadingOfAJointUndoesWhatTheDriverDoes) {
+  test::Random random(12);
+  Robot robot = test::biped(random);
+  LegKinematics as_urdf(robot, true);
+  JointSample s = test::random_joints(random);
+  for (std::size_t j = 0; j < s.position.size(); ++j) s.effort.push_back(random.normal(10));
+  JointSample driven = s;
+  JointNames::List names = s.names;
+  const auto place = [&](const char* joint) { return static_cast<std::size_t>(std::ranges::find(names, joint) - names.begin()); };
+  const std::size_t turned = place("left_3"), off = place("right_2"), a = place("left_1"), b = place("right_1");
+  for (std::vector<double>* values : {&driven.position, &driven.velocity, &driven.effort}) {
+    values->at(turned) *= -1;
+    std::swap(values->at(a), values->at(b));
+  }
+  driven.position[off] = (driven.position[off] - 0.3) * 57.3;
+  driven.velocity[off] *= 57.3;
+  robot.joints = {{"left_3", {"", -1, 0}}, {"right_2", {"", 1 / 57.3, 0.3}}, {"left_1", {"right_1", 1, 0}}, {"right_1", {"left_1", 1, 0}}};
+  LegKinematics corrected(robot, true);
+  const Feet expected = feet_of(as_urdf, s), feet = feet_of(corrected, driven);
+  EXPECT_LT(distance(expected, feet), 1e-12);
+  ASSERT_TRUE(expected.force_I && feet.force_I);
+  for (std::size_t side = 0; side < 2; ++side)
+    EXPECT_LT(((*expected.force_I)[side] - (*feet.force_I)[side]).norm(), 1e-9 * (*expected.force_I)[side].norm());
+}
+
 TEST(LegKinematics, WhatIsNotFiniteOrNotAsLongAsTheNamesIsRefused) {
   test::Random random(6);
   LegKinematics legs(test::biped(random));

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <map>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -97,10 +98,18 @@ struct CameraMount {
   }
 };
 
+/// A joint's value is scale times the message's, plus zero; its velocity scale times the message's.
+struct JointReading {
+  std::string from;            // its name in the messages; empty: as in the URDF
+  double scale = 1, zero = 0;  // -, rad (m of a prismatic joint)
+  auto operator<=>(const JointReading&) const = default;
+};
+
 struct Robot {
   std::string urdf;  // the URDF document itself, not its path
   std::array<Foot, 2> feet;
   std::vector<std::string> locked_joints;
+  std::map<std::string, JointReading> joints;  // of the URDF, where the messages hold another name, direction, unit or zero
   ImuMount imu;
   LegsMount legs;
   LidarMount lidar;

@@ -10,7 +10,7 @@
 #include <tuple>
 #include <vector>
 
-#include "kilvo/legs/link_kinematics.hpp"
+#include "lab/clocks/link_kinematics.hpp"
 #include "kilvo/math/field.hpp"
 #include "kilvo/sensors/measurement.hpp"
 #include "lab/clocks/device_clock.hpp"

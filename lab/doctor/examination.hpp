@@ -129,6 +129,8 @@ class Examination {
   LegScore score_legs(const std::vector<LegPose>& path, double offset, bool any_mount) const;
   std::vector<LegPose> legs_under(const LegHypothesis* hypothesis, double period = pose_period) const;
   bool try_leg_hypotheses();
+  /// The legs are judged under `h` from now on, which the finding's settings have done to them.
+  void find_on_legs(Finding finding, const LegHypothesis& h);
   // leg_accelerating.cpp
   LegAcceleration leg_acceleration(const LegHypothesis* hypothesis, const SO3& R_link_imu, double offset) const;
   bool try_acceleration_hypotheses();

@@ -47,9 +47,7 @@ bool Examination::try_acceleration_hypotheses() {
   Finding f{best->culprit, best->cause, best->name, {}, best->setting, 0, {}, {}, true};
   f.evidence = fmt::format("{:.1f} % of the acceleration over standing soles is the accelerometer's then, {:.1f} % as described",
                            100 * then.explained, 100 * described.explained);
-  for (const auto& [key, value] : best->changes) f.changes.push_back({key, value});
-  find(std::move(f));
-  leg_mend_ = leg_mend_ ? joined(*leg_mend_, *best) : *best;
+  find_on_legs(std::move(f), *best);
   return true;
 }
 

@@ -121,6 +121,9 @@ void Examination::examine_length_units() {
   constexpr double no_foot = 1, shortest_foot = 0.03;  // m
   if (farthest > no_foot) {
     const LengthUnit unit = unit_of(farthest, shortest_foot);
+    for (auto& foot : robot_.feet) {
+      for (Eigen::Vector3d& corner : foot.sole) corner *= unit.metres;
+    }
     find({Sensor::legs,
           "sole_unit",
           fmt::format("a corner of the soles is {:.0f} m from its link: they are in {}", farthest, unit.name),
@@ -128,11 +131,8 @@ void Examination::examine_length_units() {
           "robot.feet: sole, in metres",
           farthest,
           "m",
-          {},
+          {{"robot.feet", feet_text(robot_.feet)}},
           true});
-    for (auto& foot : robot_.feet) {
-      for (Eigen::Vector3d& corner : foot.sole) corner *= unit.metres;
-    }
   }
 }
 
@@ -140,16 +140,17 @@ bool Examination::examine_leg_names() {
   const auto& feet = robot_.feet;
   const bool swapped = mentions(feet[0].link, "right") && mentions(feet[1].link, "left");
   if (swapped) {
+    std::swap(robot_.feet[0], robot_.feet[1]);
+    std::swap(robot_.feet[0].name, robot_.feet[1].name);
     find({Sensor::legs,
           "feet_swapped",
-          fmt::format("left and right foot are swapped in the configuration: left is {}, right is {}", feet[0].link, feet[1].link),
+          fmt::format("left and right foot are swapped in the configuration: left is {}, right is {}", feet[1].link, feet[0].link),
           "the names of the links",
           "robot.feet: exchange the links (and soles) of left and right",
           0,
           "",
-          {},
+          {{"robot.feet", feet_text(feet)}},
           true});
-    std::swap(robot_.feet[0], robot_.feet[1]);
   }
   examine_length_units();
   double largest = 0;
@@ -283,9 +284,7 @@ bool Examination::try_leg_hypotheses() {
   f.evidence = fmt::format(
       "{:.0f} % of the legs' turning is that of the gyro then, {:.0f} % as described; the soles are {:.1f} and {:.1f} degrees from flat",
       100 * score.explained, 100 * described.explained, score.flatness, described.flatness);
-  for (const auto& [key, value] : best->changes) f.changes.push_back({key, value});
-  find(std::move(f));
-  leg_mend_ = leg_mend_ ? joined(*leg_mend_, *best) : *best;
+  find_on_legs(std::move(f), *best);
   return true;
 }
 

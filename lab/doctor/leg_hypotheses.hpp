@@ -1,6 +1,7 @@
 // What may be wrong with the description of legs or with their messages: changes that a recording can be tried with.
 #pragma once
 
+#include "lab/doctor/finding.hpp"
 #include "lab/doctor/leg_path.hpp"
 
 namespace kilvo::lab {
@@ -17,6 +18,11 @@ LegHypothesis degrees_hypothesis();
 
 /// Both, the first one first.
 LegHypothesis joined(const LegHypothesis& a, const LegHypothesis& b);
+
+/// robot.joints that does to the messages what the hypothesis does; nothing when it leaves them alone, or is about their unit.
+std::vector<Change> changes_of(RecordedLegs& legs, const Robot& robot, const LegHypothesis& h);
+/// As robot.feet has it.
+std::string feet_text(const std::array<Foot, 2>& feet);
 
 /// A robot of another size: all distances between its joints by one factor, 0.4 to 2.5.
 std::vector<LegHypothesis> size_hypotheses();

@@ -205,16 +205,9 @@ bool Examination::accuse_exchanged_legs(double scale, const std::string& evidenc
     constexpr double as_well = 0.03;  // of the turning
     const auto turning = [&](const LegHypothesis* legs) { return score_legs(legs_under(legs), leg_offset_, false).explained; };
     if (std::abs(way.height.value_or(0)) > leg_height_tolerance || turning(&h) < turning(nullptr) - as_well) return false;
-    find({h.culprit,
-          h.cause,
-          h.name,
-          fmt::format("{}; {:.3f} when they are exchanged", evidence, way.scale),
-          h.setting,
-          scale - 1,
-          {},
-          {},
-          true});
-    leg_mend_ = leg_mend_ ? joined(*leg_mend_, h) : h;
+    Finding f{h.culprit, h.cause, h.name, {}, h.setting, scale - 1, {}, {}, true};
+    f.evidence = fmt::format("{}; {:.3f} when they are exchanged", evidence, way.scale);
+    find_on_legs(std::move(f), h);
     return true;
   }
   return false;

@@ -1,15 +1,24 @@
 #include "lab/doctor/leg_path.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace kilvo::lab {
 
 const LinkTree& RecordedLegs::tree(const Robot& robot) {
-  return trees_.try_emplace({robot.urdf, robot.locked_joints}, robot).first->second;
+  return trees_.try_emplace({robot.urdf, robot.locked_joints, robot.joints}, robot).first->second;
 }
 
 LegKinematics RecordedLegs::kinematics(const Robot& robot) {
   return robot.urdf.empty() ? LegKinematics(robot) : LegKinematics(robot, false, &tree(robot));
+}
+
+std::vector<std::string> RecordedLegs::names_of_joints(const Robot& robot) {
+  std::vector<std::string> out = tree(robot).chain(robot.imu.link, robot.feet[0].link).names;
+  for (const std::string& name : tree(robot).chain(robot.imu.link, robot.feet[1].link).names) {
+    if (std::ranges::find(out, name) == out.end()) out.push_back(name);
+  }
+  return out;
 }
 
 LegSides RecordedLegs::sides(const Robot& robot) {

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "kilvo/legs/joint_chain.hpp"
@@ -44,6 +45,8 @@ class RecordedLegs {
   std::vector<LegPose> path(const Robot& robot, const LegHypothesis* hypothesis, double period, std::string* why);
   /// The joints that move a foot when they turn, by their place in the messages.
   std::vector<std::size_t> joints_that_matter(const Robot& robot);
+  /// The joints between the IMU's link and the feet, by their names in the messages.
+  std::vector<std::string> names_of_joints(const Robot& robot);
   /// None when the URDF cannot be used.
   LegSides sides(const Robot& robot);
 
@@ -52,7 +55,7 @@ class RecordedLegs {
   LegKinematics kinematics(const Robot& robot);
 
   const Recorded& recorded_;
-  std::map<std::pair<std::string, std::vector<std::string>>, LinkTree> trees_;  // by document and locked joints
+  std::map<std::tuple<std::string, std::vector<std::string>, std::map<std::string, JointReading>>, LinkTree> trees_;
 };
 
 /// The link's turning while either foot stands.

@@ -99,9 +99,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   f.evidence =
       fmt::format("by the LiDAR's way the soles stand for {:.1f} and {:.1f} s of the walk then, for {:.1f} and {:.1f} s as described",
                   then.of[0], then.of[1], described.of[0], described.of[1]);
-  for (const auto& [key, value] : best->changes) f.changes.push_back({key, value});
-  find(std::move(f));
-  leg_mend_ = leg_mend_ ? joined(*leg_mend_, *best) : *best;
+  find_on_legs(std::move(f), *best);
   return true;
 }
 

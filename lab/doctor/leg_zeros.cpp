@@ -43,17 +43,12 @@ bool Examination::find_wrong_zero(const StanceFit& stances, const Robot& start) 
   mend.position = [place = std::ranges::find(recorded_.joint_names, name) - recorded_.joint_names.begin(), zero](std::size_t i, double& q) {
     if (static_cast<std::ptrdiff_t>(i) == place) q += zero;
   };
-  find({Sensor::legs,
-        "joint_offset",
-        fmt::format("the zero of joint {} is off by {:.0f} degrees", name, -degrees(zero)),
-        fmt::format("soles that stand move by {:.2f} mm then, by {:.2f} as described; {:.1f} degrees, standard deviation {:.1f}",
-                    1e3 * best.moved, 1e3 * stances.moved, -degrees(zero), degrees(best.zero_sigma[*joint])),
-        fmt::format("the zero of joint {} in the driver, or its origin in robot.urdf", name),
-        -degrees(zero),
-        "deg",
-        {},
-        true});
-  leg_mend_ = leg_mend_ ? joined(*leg_mend_, mend) : mend;
+  Finding f{Sensor::legs, "joint_offset", {}, {}, {}, -degrees(zero), "deg", {}, true};
+  f.text = fmt::format("the zero of joint {} is off by {:.0f} degrees", name, -degrees(zero));
+  f.evidence = fmt::format("soles that stand move by {:.2f} mm then, by {:.2f} as described; {:.1f} degrees, standard deviation {:.1f}",
+                           1e3 * best.moved, 1e3 * stances.moved, -degrees(zero), degrees(best.zero_sigma[*joint]));
+  f.remedy = fmt::format("the zero of joint {} in the driver, or its origin in robot.urdf", name);
+  find_on_legs(std::move(f), mend);
   return true;
 }
 

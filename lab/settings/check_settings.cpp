@@ -112,6 +112,7 @@ void check_names(const Settings& s, Problems& problems) {
   check("imu.T_link_imu.link", s.robot.imu.link, names.links, "link");
   check("legs.gyro_link", s.leg_clock.gyro_link, names.links, "link");
   for (const std::string& joint : s.robot.locked_joints) check("robot.locked_joints", joint, names.joints, "joint");
+  for (const auto& [joint, reading] : s.robot.joints) check("robot.joints", joint, names.joints, "joint");
 }
 
 // What a sensor cannot do without. Keys with defaults are not in it.

@@ -30,6 +30,14 @@ std::size_t end_of_value(const std::string& text, std::size_t begin, bool in_flo
   return end;
 }
 
+// Of a list or a map over several lines: behind the last value in it.
+std::size_t end_of_node(const std::string& text, const YAML::Node& node, bool in_flow) {
+  if (node.size() == 0 || node.Style() == YAML::EmitterStyle::Flow) return end_of_value(text, position_of(node), in_flow);
+  YAML::Node last;
+  for (const auto& entry : node) last.reset(node.IsMap() ? entry.second : YAML::Node(entry));
+  return end_of_node(text, last, false);
+}
+
 // A new key at the beginning of a map, written as the map is.
 std::string with_new_key(const std::string& text, const YAML::Node& map, const std::string& name, const std::string& value) {
   const std::size_t at = position_of(map.begin()->first);
@@ -69,7 +77,7 @@ std::string with_setting(const std::string& yaml, const std::string& key, const 
     }
     const std::size_t at = position_of(node);
     std::string out = yaml;
-    return out.replace(at, end_of_value(yaml, at, in_flow) - at, value);
+    return out.replace(at, end_of_node(yaml, node, in_flow) - at, value);
   } catch (const YAML::Exception& error) {
     throw ConfigError(fmt::format("{}: {}", key, error.what()));
   }

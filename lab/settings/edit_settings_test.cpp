@@ -20,6 +20,13 @@ TEST(EditSettings, AValueChangesAndNothingElse) {
   EXPECT_EQ(with_setting(text, "lidar.rate", "20").substr(text.size() - 18), "lidar:\n  rate: 20\n");
 }
 
+TEST(EditSettings, AListOrAMapOverSeveralLinesIsReplacedAsAWhole) {
+  const std::string feet = "robot:\n  feet:\n    - {name: left, link: l}  # one\n    - name: right\n      link: r\n  urdf: a.urdf\n";
+  EXPECT_EQ(with_setting(feet, "robot.feet", "[]"), "robot:\n  feet:\n    []\n  urdf: a.urdf\n");
+  const std::string joints = "robot:\n  joints:\n    knee: {scale: -1}\n    hip:\n      zero: 0.1\n\n# end\nimu: {rate: 1}\n";
+  EXPECT_EQ(with_setting(joints, "robot.joints", "{}"), "robot:\n  joints:\n    {}\n\n# end\nimu: {rate: 1}\n");
+}
+
 TEST(EditSettings, AMissingKeyJoinsItsSection) {
   EXPECT_EQ(with_setting(text, "lidar.time_offset", "0.005").substr(text.size() - 18), "lidar:\n  time_offset: 0.005\n  rate: 10\n");
   EXPECT_THROW(with_setting(text, "camera.time_offset", "0.005"), ConfigError);

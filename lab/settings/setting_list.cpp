@@ -76,6 +76,9 @@ std::vector<Setting> list_settings(Settings& s) {
   list.own("robot.feet", &robot.feet, "m",
            "the two feet: name (left, right), link of the URDF, sole: corner points of the sole in that link");
   list.own("robot.locked_joints", &robot.locked_joints, "-", "joints between IMU and feet that do not move and are not measured");
+  list.own("robot.joints", &robot.joints, "-",
+           "joints of the URDF whose value in the messages differs: JOINT: {from: its name there, scale: -1 where it turns the other way, "
+           "zero: added, rad}");
 
   list.own("imu.topic", topic(Sensor::imu), "-", "topic of the IMU");
   list.own("imu.T_link_imu.link", &robot.imu.link, "-", "link of the URDF that the IMU is fixed to");

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,7 +16,7 @@ namespace kilvo::lab {
 
 /// Where a setting's value is stored.
 using SettingValue = std::variant<double*, int*, bool*, std::string*, std::vector<double>*, std::vector<std::string>*, Eigen::Vector3d*,
-                                  SO3*, std::array<Foot, 2>*>;
+                                  SO3*, std::array<Foot, 2>*, std::map<std::string, JointReading>*>;
 
 struct Setting {
   std::string key;           // "lidar.voxel_size"

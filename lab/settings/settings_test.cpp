@@ -201,6 +201,23 @@ TEST(Settings, RangesAreCheckedAlsoTogether) {
   EXPECT_THAT(error_of("camera: {model: equidistant, distortion: [1, 2, 3, 4, 5]}"), HasSubstr("must have 4 numbers"));
 }
 
+TEST(Settings, ReadingsOfJointsAreReadAndShown) {
+  const std::string text = R"({"hip": {"zero": 0.25}, "knee": {"from": "left_knee", "scale": -1}})";
+  Settings s = parse("robot: {joints: " + text + "}");
+  EXPECT_EQ(s.robot.joints.at("knee"), (JointReading{"left_knee", -1, 0}));
+  EXPECT_EQ(s.robot.joints.at("hip"), (JointReading{"", 1, 0.25}));
+  EXPECT_EQ(value_text(&s.robot.joints), text);
+  EXPECT_TRUE(parse("robot: {joints: {}}").robot.joints.empty());
+  EXPECT_THAT(error_of("robot: {joints: [knee]}"),
+              HasSubstr("robot.joints: must be a map of joints, JOINT: {from, scale, zero}, not a list"));
+  EXPECT_THAT(error_of("robot: {joints: {knee: -1}}"), HasSubstr("must be {from, scale, zero}, not '-1'"));
+  EXPECT_THAT(error_of("robot: {joints: {knee: {sign: -1}}}"), HasSubstr("'sign': a joint has no such entry, nearest is"));
+  EXPECT_THAT(error_of("robot: {joints: {knee: {scale: 0}}}"),
+              HasSubstr("must be a factor: 1, or -1 where it turns the other way, not '0'"));
+  EXPECT_THAT(error_of("robot: {joints: {knee: {zero: .inf}}}"), HasSubstr("robot.joints: must be a"));
+  EXPECT_THAT(error_of("robot: {joints: {knee: {zero: 1}, knee: {}}}"), HasSubstr("'knee' is given twice"));
+}
+
 TEST(Settings, TwoFeetAreRead) {
   const std::string left = "{name: left, link: l, sole: [[0, 0, 1], [1, 0, 1]]}", right = "{name: right, link: r}";
   const Settings s = parse("robot: {feet: [" + right + ", " + left + "]}");

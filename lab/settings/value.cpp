@@ -133,6 +133,39 @@ std::array<Foot, 2> read_feet(const YAML::Node& node) {
   return out;
 }
 
+JointReading read_joint(const YAML::Node& node) {
+  constexpr double least_scale = 1e-4, most = 1000;
+  if (!node.IsMap()) refuse(node, "{from, scale, zero}");
+  const std::vector<std::string> keys{"from", "scale", "zero"};
+  JointReading out;
+  for (const auto& pair : node) {
+    const std::string key = pair.first.IsScalar() ? pair.first.Scalar() : std::string();
+    if (key == "from") {
+      out.from = read_text(pair.second);
+    } else if (key == "scale") {
+      out.scale = read_number(pair.second);
+      if (!(std::abs(out.scale) >= least_scale && std::abs(out.scale) <= most))
+        refuse(pair.second, "a factor: 1, or -1 where it turns the other way");
+    } else if (key == "zero") {
+      out.zero = read_number(pair.second);
+      if (!(std::abs(out.zero) <= most)) refuse(pair.second, "an angle in rad");
+    } else {
+      throw BadValue(pair.first, fmt::format("{}: a joint has no such entry, nearest is '{}'", shown(pair.first), nearest(key, keys)));
+    }
+  }
+  return out;
+}
+
+std::map<std::string, JointReading> read_joints(const YAML::Node& node) {
+  if (!node.IsMap()) refuse(node, "a map of joints, JOINT: {from, scale, zero}");
+  std::map<std::string, JointReading> out;
+  for (const auto& pair : node) {
+    if (!out.emplace(read_text(pair.first), read_joint(pair.second)).second)
+      throw BadValue(pair.first, fmt::format("{} is given twice", shown(pair.first)));
+  }
+  return out;
+}
+
 }  // namespace
 
 void read_value(const YAML::Node& node, const SettingValue& to) {
@@ -146,13 +179,14 @@ void read_value(const YAML::Node& node, const SettingValue& to) {
                  [&](Eigen::Vector3d* x) { *x = read_vector(node); },
                  [&](SO3* x) { *x = read_rotation(node); },
                  [&](std::array<Foot, 2>* x) { *x = read_feet(node); },
+                 [&](std::map<std::string, JointReading>* x) { *x = read_joints(node); },
              },
              to);
 }
 
 std::string type_text(const SettingValue& value) {
-  constexpr const char* texts[] = {"number",        "whole number", "true or false",         "text",          "list of numbers",
-                                   "list of texts", "3 numbers",    "9 numbers, row by row", "list of 2 feet"};
+  constexpr const char* texts[] = {"number",        "whole number", "true or false",         "text",           "list of numbers",
+                                   "list of texts", "3 numbers",    "9 numbers, row by row", "list of 2 feet", "map of joints"};
   static_assert(std::size(texts) == std::variant_size_v<SettingValue>);
   return texts[value.index()];
 }

@@ -41,6 +41,21 @@ std::string text_of(const SO3& R) {
 std::string text_of(const Foot& foot) {
   return fmt::format(R"({{"name": {}, "link": {}, "sole": {}}})", json_text(foot.name), json_text(foot.link), list_text(foot.sole));
 }
+// What is as it is without an entry is left out.
+std::string text_of(const std::map<std::string, JointReading>& joints) {
+  std::string out;
+  for (const auto& [name, joint] : joints) {
+    std::string entry;
+    const auto add = [&entry](const char* key, const std::string& value) {
+      entry += fmt::format(R"({}"{}": {})", entry.empty() ? "" : ", ", key, value);
+    };
+    if (!joint.from.empty()) add("from", json_text(joint.from));
+    if (joint.scale != 1) add("scale", text_of(joint.scale));
+    if (joint.zero != 0) add("zero", text_of(joint.zero));
+    out += fmt::format("{}{}: {{{}}}", out.empty() ? "" : ", ", json_text(name), entry);
+  }
+  return "{" + out + "}";
+}
 
 template <class T>
 std::string text_of(const std::vector<T>& list) {

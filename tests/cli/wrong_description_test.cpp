@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/cli/story.hpp"
 
@@ -34,18 +35,37 @@ class WrongDescription : public testing::Test {
     const double a = degrees * 0.01745329251994;
     return fmt::format("lidar.T_imu_lidar.R=[{0}, 0, {1}, 0, 1, 0, -{1}, 0, {0}]", std::cos(a), std::sin(a));
   }
-  std::string with_knee_turned_round() const {
-    for (const auto& file : std::filesystem::directory_iterator(walk_)) {
-      if (file.path().extension() != ".urdf") continue;
-      std::string urdf = read_text(file.path().string());
-      const std::size_t joint = urdf.find("<joint name=\"left_knee_joint\""), axis = urdf.find("xyz=\"0 1 0\"", urdf.find("<axis", joint));
-      if (joint == std::string::npos || axis == std::string::npos) break;
-      urdf.replace(axis, 11, "xyz=\"0 -1 0\"");
-      std::ofstream(folder_ / "turned.urdf") << urdf;
-      return folder_ / "turned.urdf";
+  /// The robot's URDF with another axis of these joints.
+  std::string with_axis(const std::vector<std::string>& joints, const std::string& xyz) const {
+    std::string urdf = read_text(walk_ + "/robot.urdf");
+    for (const std::string& name : joints) {
+      const std::size_t joint = urdf.find("<joint name=\"" + name), axis = urdf.find("xyz=\"0 1 0\"", urdf.find("<axis", joint));
+      if (joint == std::string::npos || axis == std::string::npos) {
+        ADD_FAILURE() << "no joint " << name;
+        return "";
+      }
+      urdf.replace(axis, 11, "xyz=\"" + xyz + "\"");
     }
-    ADD_FAILURE() << "no URDF in " << walk_;
-    return "";
+    std::ofstream(folder_ / "turned.urdf") << urdf;
+    return folder_ / "turned.urdf";
+  }
+  std::string with_knee_turned_round() const { return with_axis({"left_knee_joint"}, "0 -1 0"); }
+  std::string with_knees_that_bend_sideways() const { return with_axis({"left_knee_joint", "right_knee_joint"}, "1 0 0"); }
+
+  /// The URDF of a robot that is 1.6 times as large.
+  std::string of_larger_robot() const {
+    const std::string urdf = read_text(walk_ + "/robot.urdf"), begin = "<origin xyz=\"";
+    std::string out;
+    std::size_t from = 0;
+    for (std::size_t at = urdf.find(begin); at != std::string::npos; at = urdf.find(begin, from)) {
+      at += begin.size();
+      out += urdf.substr(from, at - from);
+      from = urdf.find('"', at);
+      std::istringstream numbers(urdf.substr(at, from - at));
+      for (double x = 0; numbers >> x;) out += fmt::format("{} ", 1.6 * x);
+    }
+    std::ofstream(folder_ / "larger.urdf") << out + urdf.substr(from);
+    return folder_ / "larger.urdf";
   }
 
   TemporaryFolder folder_;
@@ -138,8 +158,17 @@ TEST_F(WrongDescription, OfTheImuOnTheRobotIsMended) {
   EXPECT_LT(error(), 0.0013);
 }
 
-TEST_F(WrongDescription, ThatNoSettingMendsLeavesTheSenseOut) {
+TEST_F(WrongDescription, OfAJointIsMended) {
   const Finished f = run("imu,legs,lidar", "robot.urdf=" + with_knee_turned_round());
+  EXPECT_EQ(f.code, 1);
+  EXPECT_THAT(f.err, AllOf(HasSubstr("joint left_knee_joint turns the other way round"),
+                           HasSubstr("restarted with robot.joints: {\"left_knee_joint\": {\"scale\": -1}}")));
+  EXPECT_TRUE(std::filesystem::exists(out_ + "/contacts.csv"));
+  EXPECT_LT(error(), 0.0013);
+}
+
+TEST_F(WrongDescription, ThatNoSettingMendsLeavesTheSenseOut) {
+  const Finished f = run("imu,legs,lidar", "robot.urdf=" + with_knees_that_bend_sideways());
   EXPECT_EQ(f.code, 1);
   EXPECT_THAT(f.err, HasSubstr("; the results are of imu, lidar alone"));
   EXPECT_FALSE(std::filesystem::exists(out_ + "/contacts.csv")) << "of the round before";
@@ -147,7 +176,7 @@ TEST_F(WrongDescription, ThatNoSettingMendsLeavesTheSenseOut) {
 }
 
 TEST_F(WrongDescription, OfTheOnlySenseThatNoSettingMendsLeavesNoResults) {
-  const Finished f = run("imu,legs", "robot.urdf=" + with_knee_turned_round());
+  const Finished f = run("imu,legs", "robot.urdf=" + of_larger_robot());
   EXPECT_EQ(f.code, 1);
   EXPECT_THAT(f.err, HasSubstr("; nothing is left to estimate with"));
   EXPECT_EQ(result("odometry.tum").find("1700000"), std::string::npos);

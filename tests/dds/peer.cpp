@@ -29,7 +29,7 @@
 #include <random>
 #include <thread>
 
-#include "kilvo/legs/link_kinematics.hpp"
+#include "lab/clocks/link_kinematics.hpp"
 #include "lab/recordings/recording_source.hpp"
 #include "tests/dds/cdr_messages.hpp"
 

@@ -69,7 +69,7 @@ class Walk {
 
   std::vector<Event> with(const Fault& fault) const {
     lab::Random random(7, 1);
-    LinkKinematics pelvis(robot_of(config_), "pelvis");
+    lab::LinkKinematics pelvis(robot_of(config_), "pelvis");
     std::vector<Event> out;
     std::array<Time, 2> last{};  // messages of one topic do not overtake each other
     for (const auto& [t, m] : measured_) {

@@ -1,11 +1,11 @@
-#include "kilvo/legs/link_kinematics.hpp"
+#include "lab/clocks/link_kinematics.hpp"
 
 #include <gtest/gtest.h>
 #include <limits>
 
 #include "tests/helpers/test_biped.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 namespace link_kinematics_test {
 
 TEST(LinkKinematics, AFootIsWhereAProductOfMatricesPutsIt) {
@@ -59,4 +59,4 @@ TEST(LinkKinematics, LockedJointsMakeItRigidAndMissingOnesUnknown) {
 }
 
 }  // namespace link_kinematics_test
-}  // namespace kilvo
+}  // namespace kilvo::lab

@@ -1,6 +1,6 @@
-#include "kilvo/legs/link_kinematics.hpp"
+#include "lab/clocks/link_kinematics.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 
 LinkKinematics::LinkKinematics(const Robot& robot, const std::string& link)
     : chain_(LinkTree(robot).chain(robot.imu.link, link)), T_IM_(robot.imu.T_link_imu.inverse()), known_(chain_.names.empty()) {}
@@ -25,4 +25,4 @@ std::optional<LinkMotion> LinkKinematics::at(const JointSample& s) {
   return finite ? std::optional(out) : std::nullopt;
 }
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

@@ -8,7 +8,7 @@
 #include "kilvo/math/se3.hpp"
 #include "kilvo/sensors/measurement.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 
 /// Pose and motion of a link relative to the IMU, in the IMU's axes.
 struct LinkMotion {
@@ -43,4 +43,4 @@ class LinkKinematics {
   bool known_ = false;  // the joints are in messages of these names
 };
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

@@ -1,0 +1,85 @@
+// Settings that do to the messages of the legs what a hypothesis does.
+#include <algorithm>
+#include <cmath>
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
+
+#include "lab/doctor/examination.hpp"
+#include "lab/doctor/leg_hypotheses.hpp"
+
+namespace kilvo::lab {
+namespace {
+
+std::string quoted(const std::string& text) { return nlohmann::json(text).dump(); }
+
+std::string text_of(const JointReading& read) {
+  std::string out;
+  const auto add = [&out](const std::string& entry) { out += (out.empty() ? "" : ", ") + entry; };
+  if (!read.from.empty()) add(fmt::format(R"("from": {})", quoted(read.from)));
+  if (read.scale != 1) add(fmt::format(R"("scale": {})", read.scale));
+  if (read.zero != 0) add(fmt::format(R"("zero": {:.4f})", read.zero));
+  return "{" + out + "}";
+}
+
+// The joint of the URDF that is read from messages under this name.
+std::string joint_read_from(const Robot& robot, const std::string& name) {
+  const auto it = std::ranges::find(robot.joints, name, [](const auto& entry) { return entry.second.from; });
+  return it == robot.joints.end() ? name : it->first;
+}
+
+}  // namespace
+
+std::vector<Change> changes_of(RecordedLegs& legs, const Robot& robot, const LegHypothesis& h) {
+  if (!h.names && !h.position) return {};
+  const std::vector<std::string> names = legs.recorded().joint_names;
+  std::vector<std::string> then = names;
+  if (h.names) h.names(then);
+  std::map<std::string, JointReading> readings = robot.joints;
+  for (const std::string& read : legs.names_of_joints(robot)) {
+    const auto place = static_cast<std::size_t>(std::ranges::find(then, read) - then.begin());
+    if (place >= names.size()) return {};
+    const std::string joint = joint_read_from(robot, read);
+    JointReading& reading = readings[joint];
+    reading.from = names[place] == joint ? "" : names[place];
+    double zero = 0, one = 1;
+    if (h.position) {
+      h.position(place, zero);
+      h.position(place, one);
+    }
+    const double direction = one - zero;
+    if (std::abs(std::abs(direction) - 1) > 1e-9) return {};  // of another unit, which no joint's velocity would have
+    reading.zero += reading.scale * zero;
+    reading.scale *= direction > 0 ? 1 : -1;
+  }
+  std::string value;
+  for (const auto& [joint, reading] : readings) {
+    if (reading != JointReading{}) value += fmt::format("{}{}: {}", value.empty() ? "" : ", ", quoted(joint), text_of(reading));
+  }
+  return {{"robot.joints", "{" + value + "}"}};
+}
+
+std::string feet_text(const std::array<Foot, 2>& feet) {
+  std::string out;
+  for (const Foot& foot : feet) {
+    std::string sole;
+    for (const Eigen::Vector3d& p : foot.sole)
+      sole += fmt::format("{}[{:.6g}, {:.6g}, {:.6g}]", sole.empty() ? "" : ", ", p.x(), p.y(), p.z());
+    out +=
+        fmt::format(R"({}{{"name": {}, "link": {}, "sole": [{}]}})", out.empty() ? "" : ", ", quoted(foot.name), quoted(foot.link), sole);
+  }
+  return "[" + out + "]";
+}
+
+void Examination::find_on_legs(Finding f, const LegHypothesis& h) {
+  leg_mend_ = leg_mend_ ? joined(*leg_mend_, h) : h;
+  for (const auto& [key, value] : h.changes) f.changes.push_back({key, value});
+  if (h.names || h.position) {
+    for (const Change& change : changes_of(recorded_legs_, robot_, *leg_mend_)) {
+      f.remedy = fmt::format("{}: {}; or {}", change.key, change.value, f.remedy);
+      f.changes.push_back(change);
+    }
+  }
+  find(std::move(f));
+}
+
+}  // namespace kilvo::lab
