@@ -1,11 +1,9 @@
 // What a hypothesis does to the messages, and the setting that does the same.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <yaml-cpp/yaml.h>
 
 #include "lab/doctor/leg_hypotheses.hpp"
-#include "lab/settings/setting_list.hpp"
-#include "lab/settings/value.hpp"
+#include "lab/settings/settings.hpp"
 #include "tests/helpers/test_biped.hpp"
 
 namespace kilvo::lab {
@@ -21,16 +19,12 @@ Recorded some_messages(test::Random& random) {
   return out;
 }
 
-Robot changed(const Robot& robot, const std::vector<Change>& changes) {
-  Settings settings;
-  settings.robot = robot;
+Robot changed(Robot robot, const std::vector<Change>& changes) {
   for (const Change& change : changes) {
     EXPECT_EQ(change.key, "robot.joints");
-    for (const Setting& setting : list_settings(settings)) {
-      if (setting.key == change.key) read_value(YAML::Load(change.value), setting.value);
-    }
+    robot.joints = parse_settings("robot: {joints: " + change.value + "}", "changed", ".").robot.joints;
   }
-  return settings.robot;
+  return robot;
 }
 
 // The largest distance between corners of the soles, m.
@@ -79,10 +73,7 @@ TEST(LegChanges, AnotherUnitOrAnotherLinkIsNoReadingOfAJoint) {
 TEST(LegChanges, FeetAreWrittenAsTheyAreRead) {
   test::Random random(7);
   const Robot robot = test::biped(random);
-  Settings settings;
-  for (const Setting& setting : list_settings(settings)) {
-    if (setting.key == "robot.feet") read_value(YAML::Load(feet_text(robot.feet)), setting.value);
-  }
+  const Settings settings = parse_settings("robot: {feet: " + feet_text(robot.feet) + "}", "feet", ".");
   for (std::size_t side = 0; side < 2; ++side) {
     EXPECT_EQ(settings.robot.feet[side].name, robot.feet[side].name);
     EXPECT_EQ(settings.robot.feet[side].link, robot.feet[side].link);
