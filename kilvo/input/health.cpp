@@ -97,7 +97,8 @@ bool Health::repeats(const LidarScan& scan) {
 }
 
 bool Health::repeats(const Measurement& m) {
-  if (const auto* imu = std::get_if<ImuSample>(&m)) return imu->gyro == imu_.gyro && imu->accel == imu_.accel;
+  // Either half may be frozen while the other goes on.
+  if (const auto* imu = std::get_if<ImuSample>(&m)) return imu->gyro == imu_.gyro || imu->accel == imu_.accel;
   if (const auto* legs = std::get_if<JointSample>(&m)) {
     const bool same = legs->position == position_ && legs->velocity == velocity_;
     if (!same) position_.assign(legs->position.begin(), legs->position.end());

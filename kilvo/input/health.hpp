@@ -21,7 +21,7 @@ std::optional<Reason> fault_of(const Measurement& m);
 struct StreamHealth {
   std::uint64_t messages = 0;
   double mean_interval = 0, jitter = 0, longest_gap = 0;  // s, between stamps; the jitter is a standard deviation
-  std::uint64_t repeated = 0;                             // messages that say what the one before said, to the last bit
+  std::uint64_t repeated = 0;                             // messages that repeat the one before to the last bit (gyro or accelerometer)
   std::uint64_t frozen = 0;                               // times that it was taken as frozen
   std::uint64_t clipped = 0;                              // IMU samples at the end of its range
   std::uint64_t off_clock = 0;                            // messages stamped too far ahead of the IMU's newest

@@ -50,6 +50,39 @@ TEST(Health, AFrozenImuIsSaidWithin20SamplesAndIsAliveWhenItSpeaksAgain) {
   EXPECT_FALSE(health.is_frozen(Sensor::imu));
 }
 
+// As some accelerometers do when their driver loses them, and gyros that end at zero.
+TEST(Health, HalfAnImuIsFrozenWhileTheOtherHalfGoesOn) {
+  for (const bool accel : {true, false}) {
+    Health health{Robot{}};
+    Stream stream(true);
+    ImuSample last;
+    for (int i = 0; i < 100; ++i) EXPECT_EQ(health.judge(last = stream.next()), std::nullopt);
+    int used = 0;
+    for (int i = 0; i < 20; ++i) {
+      ImuSample s = stream.next();
+      (accel ? s.accel : s.gyro) = accel ? last.accel : last.gyro;
+      used += health.judge(s) ? 0 : 1;
+    }
+    EXPECT_LE(used, 1) << accel;
+    EXPECT_TRUE(health.is_frozen(Sensor::imu)) << accel;
+    EXPECT_EQ(health.judge(stream.next()), std::nullopt);
+    EXPECT_FALSE(health.is_frozen(Sensor::imu));
+  }
+}
+
+// An accelerometer that is read half as often as the gyro says each value twice.
+TEST(Health, AnAccelerometerOfHalfTheRateIsNotFrozen) {
+  Health health{Robot{}};
+  Stream stream(true);
+  Eigen::Vector3d held = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 500; ++i) {
+    ImuSample s = stream.next();
+    if (i % 2 == 0) held = s.accel;
+    s.accel = held;
+    EXPECT_EQ(health.judge(s), std::nullopt);
+  }
+}
+
 TEST(Health, AnImuWithoutNoiseIsNotFrozen) {
   Health health{Robot{}};
   ImuSample s;

@@ -37,7 +37,8 @@ bool spoils(const Finding& finding) {
 
 bool is_mendable(const Finding& finding) {
   constexpr double time = 0.01;  // s, that the estimator finds and corrects by itself
-  if (finding.changes.empty() || finding.cause.ends_with("_rate")) return false;
+  // Legs that are wrong otherwise may fit better with two joints exchanged: that is for a person to decide.
+  if (finding.changes.empty() || finding.cause.ends_with("_rate") || finding.cause == "joints_exchanged") return false;
   return !finding.cause.ends_with("_clock") || std::abs(finding.size) > time;
 }
 
