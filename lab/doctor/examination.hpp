@@ -129,6 +129,8 @@ class Examination {
   LegScore score_legs(const std::vector<LegPose>& path, double offset, bool any_mount) const;
   std::vector<LegPose> legs_under(const LegHypothesis* hypothesis, double period = pose_period) const;
   bool try_leg_hypotheses();
+  /// So much of the legs' turning is the gyro's at another time, or with one or two joints as another hypothesis has them.
+  bool legs_explain_turning(double share);
   /// The legs are judged under `h` from now on, which the finding's settings have done to them.
   void find_on_legs(Finding finding, const LegHypothesis& h);
   // leg_accelerating.cpp

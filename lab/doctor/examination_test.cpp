@@ -239,6 +239,16 @@ std::size_t place_of(const std::string& joint) {
   return static_cast<std::size_t>(std::ranges::find(names, joint) - names.begin());
 }
 
+// Yaws of the other direction turn the legs as a gyro of the other hand would.
+TEST(Doctor, OnTheLegsAloneJointsAreAccusedBeforeTheGyro) {
+  Recorded recorded = walked().recorded;
+  recorded.sweeps.clear();
+  for (LegSample& s : recorded.legs) {
+    for (const char* joint : {"left_hip_yaw_joint", "right_hip_yaw_joint"}) s.position.at(place_of(joint)) *= -1;
+  }
+  EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("joint_sign"));
+}
+
 TEST(Doctor, JointsThatAreExchangedAreNamed) {
   const std::array<std::array<const char*, 2>, 4> exchanged{{{"left_knee_joint", "right_knee_joint"},
                                                              {"left_hip_yaw_joint", "right_hip_yaw_joint"},

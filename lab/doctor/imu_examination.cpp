@@ -192,7 +192,7 @@ void Examination::settle_axes() {
     const double better = smaller_by(1 - legs_.explained, 1 - legs_.as_described, independent_turns());
     if (better < sure_among(signed_permutations().size())) return;
     const Eigen::Matrix3d G = nearest_permutation(legs_.error).transpose();
-    if (G.determinant() < 0)
+    if (G.determinant() < 0 && !legs_explain_turning(legs_.explained))
       accuse_imu_axes(G, Eigen::Matrix3d::Identity(), "the legs turn as the gyro does only with axes of the other hand");
     return;
   }

@@ -70,6 +70,23 @@ std::string feet_text(const std::array<Foot, 2>& feet) {
   return "[" + out + "]";
 }
 
+bool Examination::legs_explain_turning(double share) {
+  const GyroPath gyro_path = gyro();
+  const Eigen::Matrix3d axes = robot_.imu.T_link_imu.R.inverse().matrix();
+  const auto explains = [&](const std::vector<Turn>& turns, double offset) {
+    return explained_by(turns, gyro_path, offset, axes) >= share;
+  };
+  const std::vector<double> offsets = likely_offsets(leg_turns_, gyro_path);
+  if (std::ranges::any_of(offsets, [&](double offset) { return explains(leg_turns_, offset); })) return true;
+  std::vector<LegHypothesis> all = leg_hypotheses(recorded_legs_, robot_);
+  for (LegHypothesis& h : gross_leg_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
+  return std::ranges::any_of(all, [&](const LegHypothesis& h) {
+    if (h.culprit != Sensor::legs || h.parts > 2) return false;
+    const std::vector<Turn> turns = leg_turns(legs_under(&h, turn_interval - 1e-4), turn_interval);
+    return explains(turns, 0) || explains(turns, legs_.offset);
+  });
+}
+
 void Examination::find_on_legs(Finding f, const LegHypothesis& h) {
   leg_mend_ = leg_mend_ ? joined(*leg_mend_, h) : h;
   for (const auto& [key, value] : h.changes) f.changes.push_back({key, value});

@@ -261,9 +261,10 @@ WayScale TranslationRows::scale(const Eigen::Matrix3d& axes, const TranslationFi
     H.diagonal().array() += 1e-9;  // of what does not show
     x += H.ldlt().solve(g);
   }
-  const double factor = x[n - 1], attenuation = 1 - left / moved;
+  const double factor = x[n - 1];
   if (!(x.allFinite() && factor > 0 && moved > 0)) return {};
-  return {factor, std::sqrt(jackknife(blocks, H)(n - 1, n - 1)), attenuation > 0 ? factor / attenuation : INFINITY};
+  // The slope of the other regression, of the acceleration on the way: factor / R^2 with R^2 = factor^2 moved / (factor^2 moved + left).
+  return {factor, std::sqrt(jackknife(blocks, H)(n - 1, n - 1)), factor + left / (factor * moved)};
 }
 
 }  // namespace kilvo::lab

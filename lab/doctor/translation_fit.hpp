@@ -27,7 +27,7 @@ struct TranslationFit {
 struct WayScale {
   double factor = 1, sigma = INFINITY;
   /// The accelerometer's noise makes a slope of least squares too small: were it all that is not explained, it would be this (at least
-  /// `factor`; infinite where nothing is explained).
+  /// `factor`).
   double most = INFINITY;
   /// How far (in standard deviations) it is from a factor, which noise may have made smaller.
   double distance_to(double other) const { return std::max({0.0, factor - other, other - most}) / sigma; }
