@@ -15,8 +15,9 @@ std::string failure_of(const RunSummary& run_summary, const Estimator& estimator
     if (event.reason == Reason::diverged) return "diverged: " + event.detail;
   }
   const bool legs_used = estimator.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
-  if (with_lidar && run_summary.sweeps() == 0 && !legs_used) return "no LiDAR scan could be used";
-  return "";
+  if (run_summary.sweeps() > 0 || legs_used) return "";
+  return with_lidar ? "no LiDAR scan could be used"
+                    : "no message of the legs could be used: the positions are integrated from the IMU alone";
 }
 
 }  // namespace kilvo::cli

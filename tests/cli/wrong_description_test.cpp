@@ -167,6 +167,12 @@ TEST_F(WrongDescription, OfAJointIsMended) {
   EXPECT_LT(error(), 0.0013);
 }
 
+TEST_F(WrongDescription, AnImuByItselfIsNoOdometry) {
+  const Finished f = kilvo({"run", walk_, "--sensors", "imu,legs", "--drop", "legs:0-", "--out", out_, "--quiet", "--no-map"});
+  EXPECT_EQ(f.code, 1);
+  EXPECT_THAT(f.err, HasSubstr("no message of the legs could be used: the positions are integrated from the IMU alone"));
+}
+
 TEST_F(WrongDescription, ThatNoSettingMendsLeavesTheSenseOut) {
   const Finished f = run("imu,legs,lidar", "robot.urdf=" + with_knees_that_bend_sideways());
   EXPECT_EQ(f.code, 1);
