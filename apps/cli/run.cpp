@@ -69,7 +69,8 @@ void add_run(CLI::App& program, Action& chosen) {
       ->type_name("SENSOR:T0-T1")
       ->allow_extra_args(false);
   verb->add_option("--degrade", words->degradations,
-                   "degrade a sensor's data between two times: dark or blank images, scans of a narrow sector (dark:10-16), repeatable")
+                   "degrade a sensor's data between two times: dark or blank images, scans of a narrow sector, an accel or gyro that is "
+                   "frozen (dark:10-16), repeatable")
       ->type_name("KIND:T0-T1")
       ->allow_extra_args(false);
   verb->add_option("--realtime", words->realtime, "play it through the live runner, so many times as fast as it was recorded (1)")

@@ -133,12 +133,15 @@ lab::Failure parse_drop(const std::string& text) {
 }
 
 lab::Failure parse_degradation(const std::string& text) {
-  const UsageError wrong(fmt::format("--degrade {}: must be KIND:T0-T1, KIND one of dark, blank, narrow, as in dark:10-16", text));
+  const UsageError wrong(
+      fmt::format("--degrade {}: must be KIND:T0-T1, KIND one of dark, blank, narrow, accel, gyro, as in dark:10-16", text));
   // A thirtieth of the light; a sector of 30 degrees.
   const std::map<std::string, lab::Failure> kinds{
       {"dark", {.kind = lab::FailureKind::darkness, .sensor = Sensor::camera, .amount = 1.0 / 30}},
       {"blank", {.kind = lab::FailureKind::textureless, .sensor = Sensor::camera}},
-      {"narrow", {.kind = lab::FailureKind::narrow_sector, .sensor = Sensor::lidar, .amount = std::numbers::pi / 6}}};
+      {"narrow", {.kind = lab::FailureKind::narrow_sector, .sensor = Sensor::lidar, .amount = std::numbers::pi / 6}},
+      {"accel", {.kind = lab::FailureKind::freeze_half, .sensor = Sensor::imu}},
+      {"gyro", {.kind = lab::FailureKind::freeze_half, .sensor = Sensor::imu, .amount = 1}}};
   const std::size_t colon = text.find(':');
   const auto kind = kinds.find(text.substr(0, colon));
   if (colon == std::string::npos || kind == kinds.end()) throw wrong;

@@ -18,7 +18,8 @@ std::vector<Sensor> parse_sensors(const std::string& list);
 /// "lidar:10-16", "lidar:10-" (to the end). Throws UsageError.
 lab::Failure parse_drop(const std::string& text);
 
-/// "dark:10-16", "blank:10-16" (images), "narrow:10-" (scans of 30 degrees). Throws UsageError.
+/// "dark:10-16", "blank:10-16" (images), "narrow:10-" (scans of 30 degrees), "accel:10-12", "gyro:10-12" (an IMU half of which repeats its
+/// last values). Throws UsageError.
 lab::Failure parse_degradation(const std::string& text);
 
 /// "camera:50": its messages come 50 ms later. Throws UsageError.

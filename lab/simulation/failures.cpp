@@ -81,6 +81,15 @@ void freeze(Measurement& measurement, const std::optional<Measurement>& before) 
   stamp_in(measurement) = t;
 }
 
+void freeze_half(Measurement& measurement, const std::optional<Measurement>& before, bool gyro) {
+  auto* imu = std::get_if<ImuSample>(&measurement);
+  if (imu == nullptr || !before) return;
+  const ImuSample& last = std::get<ImuSample>(*before);
+  (gyro ? imu->gyro : imu->accel) = gyro ? last.gyro : last.accel;
+}
+
+bool keeps_the_last(const Failure& failure) { return failure.kind == FailureKind::freeze || failure.kind == FailureKind::freeze_half; }
+
 }  // namespace
 
 FailingSource::FailingSource(MeasurementSource& source, std::vector<Failure> failures, Time begin, std::function<Time()> arrival,
@@ -95,6 +104,8 @@ void FailingSource::spoil(const Failure& failure, Measurement& measurement) {
   switch (failure.kind) {
     case FailureKind::freeze:
       return freeze(measurement, before_[measurement.index()]);
+    case FailureKind::freeze_half:
+      return freeze_half(measurement, before_[measurement.index()], failure.amount > 0);
     case FailureKind::not_a_number:
       return make_nan(measurement);
     case FailureKind::noise:
@@ -130,10 +141,10 @@ void FailingSource::take(Measurement measurement, Time arrived) {
     }
     if (failure.kind == FailureKind::delay) delay += failure.amount;
     twice = twice || failure.kind == FailureKind::duplicate;
-    frozen = frozen || failure.kind == FailureKind::freeze;
+    frozen = frozen || keeps_the_last(failure);
   }
   const bool remember =
-      !frozen && std::ranges::any_of(failures_, [&](const Failure& f) { return f.kind == FailureKind::freeze && f.sensor == sensor; });
+      !frozen && std::ranges::any_of(failures_, [&](const Failure& f) { return keeps_the_last(f) && f.sensor == sensor; });
   if (remember) before_[measurement.index()] = measurement;
   for (const Failure& failure : failures_) {
     if (is_on(failure, sensor, arrived)) spoil(failure, measurement);

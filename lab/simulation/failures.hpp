@@ -17,6 +17,7 @@ namespace kilvo::lab {
 enum class FailureKind : std::uint8_t {
   drop,           // the messages are lost
   freeze,         // they come in time, but say what the last one before said
+  freeze_half,    // the IMU's accelerometer does (`amount` 0), or its gyro (1), and the other half goes on
   delay,          // they come `amount` seconds later
   not_a_number,   // IMU and joints say NaN; of a scan every second point
   noise,          // Gaussian, sigma `amount`: rad/s and m/s^2, rad, m for each coordinate, grey levels

@@ -95,6 +95,17 @@ TEST(Failures, AFrozenSensorRepeatsItselfInTime) {
   }
 }
 
+TEST(Failures, HalfAnImuRepeatsItselfWhileTheOtherHalfGoesOn) {
+  const auto whole = with<ImuSample>({FailureKind::drop, Sensor::legs}),
+             accel = with<ImuSample>({FailureKind::freeze_half, Sensor::imu, 0.1}),
+             gyro = with<ImuSample>({FailureKind::freeze_half, Sensor::imu, 0.1, 9, 1});
+  ASSERT_EQ(accel.size(), whole.size());
+  EXPECT_EQ(accel.back().gyro, whole.back().gyro);
+  EXPECT_EQ(gyro.back().accel, whole.back().accel);
+  EXPECT_EQ(accel[accel.size() - 2].accel, accel.back().accel);
+  EXPECT_EQ(gyro[gyro.size() - 2].gyro, gyro.back().gyro);
+}
+
 TEST(Failures, DelayedMessagesComeLaterWithTheirOldStamps) {
   TinySource source;
   FailingSource failing(source, {{FailureKind::delay, Sensor::lidar, 0, 9, 0.25}}, begin);

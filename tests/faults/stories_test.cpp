@@ -78,6 +78,15 @@ TEST_F(Faults, WithoutLidarAnImuThatWasSilentLeavesAnHonestEstimate) {
   EXPECT_LT(o.worst(&Moment::sigmas, 5, 14), 4.0);
 }
 
+TEST_F(Faults, AnImuHalfOfWhichIsFrozenIsAFrozenImu) {
+  for (const double gyro : {0.0, 1.0}) {
+    const Outcome o = with({{FailureKind::freeze_half, Sensor::imu, 6, 6.5, gyro}});
+    say(gyro > 0 ? "gyro frozen 0.5" : "accelerometer frozen 0.5", o, 6, 14);
+    EXPECT_LT(o.worst(&Moment::sigmas, 5, 14), 3.5);
+    EXPECT_LT(o.worst(&Moment::error, 9, 14), 0.009);
+  }
+}
+
 TEST_F(Faults, AllButTheImuLostForTwoSeconds) {
   const Outcome o = with({{FailureKind::drop, Sensor::lidar, 6, 8}, {FailureKind::drop, Sensor::legs, 6, 8}});
   say("coast 2 s", o, 6, 8.1);
