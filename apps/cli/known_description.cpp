@@ -86,7 +86,7 @@ KnownDescription refined(const lab::Settings& settings, const RunOptions& option
     }
     for (const lab::Finding& f : now.diagnosis.findings) {
       // That is for the run to find, and to end with. Clocks that the estimator would correct by itself are corrected from the start.
-      if (lab::as_wrong(f, Time{}, 0).spoils || f.changes.empty()) return {};
+      if (lab::as_wrong(f, Time{}, 0).spoils || f.changes.empty() || f.cause == "joints_exchanged") return {};
       lab::put(known.refined, f.changes);
     }
   }
@@ -108,8 +108,13 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
     }
     if (!std::ranges::any_of(wrong, [&](const WrongDescription& w) { return known.stops(w); }))
       known.wrong.insert(known.wrong.end(), again.begin(), again.end());
-    for (const WrongDescription& w : wrong) {
-      if (known.stops(w)) lab::put(known.mended, w.finding.changes);
+    // Whether joints are exchanged is for a person to decide, and with it whatever else is said of joints.
+    const bool undecided = std::ranges::any_of(wrong, [](const WrongDescription& w) { return w.finding.cause == "joints_exchanged"; });
+    for (WrongDescription& w : wrong) {
+      if (undecided && std::ranges::any_of(w.finding.changes, [](const lab::Change& c) { return c.key == "robot.joints"; }))
+        w.is_mendable = false;
+      else if (known.stops(w))
+        lab::put(known.mended, w.finding.changes);
     }
     if (!known.mended.empty()) {
       put_taken(known.mended, measured_after(first, options, mended(known, options, config), used).refinements);

@@ -17,7 +17,7 @@ std::string failure_of(const RunSummary& run_summary, const Estimator& estimator
   const bool legs_used = estimator.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
   if (run_summary.sweeps() > 0 || legs_used) return "";
   return with_lidar ? "no LiDAR scan could be used"
-                    : "no message of the legs could be used: the positions are integrated from the IMU alone";
+                    : "no message of legs or LiDAR could be used: the positions are integrated from the IMU alone";
 }
 
 }  // namespace kilvo::cli

@@ -97,8 +97,7 @@ bool Health::repeats(const LidarScan& scan) {
 }
 
 bool Health::repeats(const Measurement& m) {
-  // Either half may be frozen while the other goes on.
-  if (const auto* imu = std::get_if<ImuSample>(&m)) return imu->gyro == imu_.gyro || imu->accel == imu_.accel;
+  if (const auto* imu = std::get_if<ImuSample>(&m)) return imu->gyro == imu_.gyro && imu->accel == imu_.accel;
   if (const auto* legs = std::get_if<JointSample>(&m)) {
     const bool same = legs->position == position_ && legs->velocity == velocity_;
     if (!same) position_.assign(legs->position.begin(), legs->position.end());
@@ -112,10 +111,27 @@ bool Health::repeats(const Measurement& m) {
   return std::exchange(picture_, print) == print;
 }
 
+// Either half may be frozen while the other goes on. At rest a half of few steps or with a dead band repeats itself: an acceleration that
+// stays the same to the last bit while the robot turns does not, nor a rate that is no rest.
+bool Health::half_is_frozen(const ImuSample& imu) {
+  const auto is_frozen = [](Half& half, bool same) {
+    half.same = same ? half.same + 1 : 0;
+    if (!same || half.different < alive) half.different = same ? 0 : std::min(alive, half.different + 1);
+    return half.different == alive && half.same >= imu_same;
+  };
+  const bool accel = is_frozen(accel_, imu.accel == imu_.accel), gyro = is_frozen(gyro_, imu.gyro == imu_.gyro);
+  return (accel && imu_motion_ > moving) || (gyro && imu.gyro.norm() > moving);
+}
+
 // Repeated values carry nothing new. Of a sensor that never repeats itself they are not used, and enough of them mean that it is frozen.
 std::optional<Reason> Health::judge_repeats(const Measurement& m, StreamHealth& stream, Tracker& tracker) {
   const Time t = stamp_of(m);
+  const auto* imu = std::get_if<ImuSample>(&m);
+  const bool half_frozen = imu != nullptr && half_is_frozen(*imu);
   if (!repeats(m)) {
+    stream.repeated += half_frozen ? 1 : 0;
+    if (half_frozen && !std::exchange(tracker.frozen, true)) ++stream.frozen;
+    if (half_frozen) return Reason::frozen;
     tracker.same = 0;
     tracker.frozen = false;
     tracker.different = std::min(alive, tracker.different + 1);

@@ -21,7 +21,7 @@ std::optional<Reason> fault_of(const Measurement& m);
 struct StreamHealth {
   std::uint64_t messages = 0;
   double mean_interval = 0, jitter = 0, longest_gap = 0;  // s, between stamps; the jitter is a standard deviation
-  std::uint64_t repeated = 0;                             // messages that repeat the one before to the last bit (gyro or accelerometer)
+  std::uint64_t repeated = 0;                             // messages that say what the one before said, to the last bit
   std::uint64_t frozen = 0;                               // times that it was taken as frozen
   std::uint64_t clipped = 0;                              // IMU samples at the end of its range
   std::uint64_t off_clock = 0;                            // messages stamped too far ahead of the IMU's newest
@@ -59,6 +59,10 @@ class Health {
     std::uint64_t imu_before = 0, before = 0;
   };
   void time(StreamHealth& stream, Tracker& tracker, Time t);
+  struct Half {
+    int same = 0, different = 0;  // samples in a row; as in Tracker
+  };
+  bool half_is_frozen(const ImuSample& imu);
   bool repeats(const Measurement& m);
   bool repeats(const LidarScan& scan);
   std::optional<Reason> judge_repeats(const Measurement& m, StreamHealth& stream, Tracker& tracker);
@@ -68,7 +72,8 @@ class Health {
   std::array<double, sensor_count> rates_;
   std::array<StreamHealth, sensor_count> streams_;
   std::array<Tracker, sensor_count> trackers_;
-  ImuSample imu_;                            // the last
+  ImuSample imu_;  // the last
+  Half accel_, gyro_;
   std::vector<double> position_, velocity_;  // of the last leg message
   std::vector<Eigen::Vector3f> cloud_;       // points of the last sweep
   std::size_t cloud_size_ = 0;               // points that it had in all

@@ -70,7 +70,7 @@ KDL::Tree tree_of(const Robot& robot) {
 
 // From the frame behind one joint to that behind the next, by the values of a message.
 void pass(const ChainJoint& joint, double value, double rate, MovingFrame& frame) {
-  const double q = joint.reading.scale * value + joint.reading.zero, dq = joint.reading.scale * rate;
+  const double q = joint.reading.sign * value + joint.reading.zero, dq = joint.reading.sign * rate;
   const Eigen::Vector3d arm = frame.R * joint.p;
   frame.p += arm;
   frame.v += frame.omega.cross(arm);

@@ -104,10 +104,9 @@ std::optional<Eigen::Vector3d> LegKinematics::Chains::force_on(std::size_t side,
   Eigen::Vector3d Jt = Eigen::Vector3d::Zero();
   one_moves.assign(s.position.size(), 0.0);
   const auto& others = legs[1 - side].places;
-  for (std::size_t i = 0; i < legs[side].places.size(); ++i) {
-    const std::size_t place = legs[side].places[i];
-    if (std::ranges::find(others, place) != others.end()) continue;       // the waist carries both
-    one_moves[place] = 1 / std::abs(legs[side].joints[i].reading.scale);  // an effort has the joint's direction, whatever its unit
+  for (const std::size_t place : legs[side].places) {
+    if (std::ranges::find(others, place) != others.end()) continue;  // the waist carries both
+    one_moves[place] = 1;
     const MovingFrame foot = legs[side].end(s.position, one_moves);
     one_moves[place] = 0;
     const Eigen::Vector3d column = foot.v + foot.omega.cross(foot.R * middle);

@@ -174,9 +174,8 @@ TEST(LegKinematics, AReadingOfAJointUndoesWhatTheDriverDoes) {
     values->at(turned) *= -1;
     std::swap(values->at(a), values->at(b));
   }
-  driven.position[off] = (driven.position[off] - 0.3) * 57.3;
-  driven.velocity[off] *= 57.3;
-  robot.joints = {{"left_3", {"", -1, 0}}, {"right_2", {"", 1 / 57.3, 0.3}}, {"left_1", {"right_1", 1, 0}}, {"right_1", {"left_1", 1, 0}}};
+  driven.position[off] -= 0.3;
+  robot.joints = {{"left_3", {"", -1, 0}}, {"right_2", {"", 1, 0.3}}, {"left_1", {"right_1", 1, 0}}, {"right_1", {"left_1", 1, 0}}};
   LegKinematics corrected(robot, true);
   const Feet expected = feet_of(as_urdf, s), feet = feet_of(corrected, driven);
   EXPECT_LT(distance(expected, feet), 1e-12);

@@ -98,10 +98,10 @@ struct CameraMount {
   }
 };
 
-/// A joint's value is scale times the message's, plus zero; its velocity scale times the message's.
+/// A joint's value is sign times the message's, plus zero; its velocity sign times the message's.
 struct JointReading {
-  std::string from;            // its name in the messages; empty: as in the URDF
-  double scale = 1, zero = 0;  // -, rad (m of a prismatic joint)
+  std::string from;           // its name in the messages; empty: as in the URDF
+  double sign = 1, zero = 0;  // -, rad (m of a prismatic joint)
   auto operator<=>(const JointReading&) const = default;
 };
 
@@ -109,7 +109,7 @@ struct Robot {
   std::string urdf;  // the URDF document itself, not its path
   std::array<Foot, 2> feet;
   std::vector<std::string> locked_joints;
-  std::map<std::string, JointReading> joints;  // of the URDF, where the messages hold another name, direction, unit or zero
+  std::map<std::string, JointReading> joints;  // of the URDF, where the messages hold another name, direction or zero
   ImuMount imu;
   LegsMount legs;
   LidarMount lidar;

@@ -16,15 +16,9 @@ std::string text_of(const JointReading& read) {
   std::string out;
   const auto add = [&out](const std::string& entry) { out += (out.empty() ? "" : ", ") + entry; };
   if (!read.from.empty()) add(fmt::format(R"("from": {})", quoted(read.from)));
-  if (read.scale != 1) add(fmt::format(R"("scale": {})", read.scale));
+  if (read.sign < 0) add(fmt::format(R"("sign": {})", read.sign));
   if (read.zero != 0) add(fmt::format(R"("zero": {:.4f})", read.zero));
   return "{" + out + "}";
-}
-
-// The joint of the URDF that is read from messages under this name.
-std::string joint_read_from(const Robot& robot, const std::string& name) {
-  const auto it = std::ranges::find(robot.joints, name, [](const auto& entry) { return entry.second.from; });
-  return it == robot.joints.end() ? name : it->first;
 }
 
 }  // namespace
@@ -35,10 +29,11 @@ std::vector<Change> changes_of(RecordedLegs& legs, const Robot& robot, const Leg
   std::vector<std::string> then = names;
   if (h.names) h.names(then);
   std::map<std::string, JointReading> readings = robot.joints;
-  for (const std::string& read : legs.names_of_joints(robot)) {
+  Robot changed = robot;
+  if (h.robot) h.robot(changed);
+  for (const auto& [joint, read] : legs.names_of_joints(changed)) {
     const auto place = static_cast<std::size_t>(std::ranges::find(then, read) - then.begin());
     if (place >= names.size()) return {};
-    const std::string joint = joint_read_from(robot, read);
     JointReading& reading = readings[joint];
     reading.from = names[place] == joint ? "" : names[place];
     double zero = 0, one = 1;
@@ -48,8 +43,8 @@ std::vector<Change> changes_of(RecordedLegs& legs, const Robot& robot, const Leg
     }
     const double direction = one - zero;
     if (std::abs(std::abs(direction) - 1) > 1e-9) return {};  // of another unit, which no joint's velocity would have
-    reading.zero += reading.scale * zero;
-    reading.scale *= direction > 0 ? 1 : -1;
+    reading.zero += reading.sign * zero;
+    reading.sign *= direction > 0 ? 1 : -1;
   }
   std::string value;
   for (const auto& [joint, reading] : readings) {

@@ -1,4 +1,5 @@
 // What a hypothesis does to the messages, and the setting that does the same.
+#include <algorithm>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -59,6 +60,20 @@ TEST(LegChanges, RobotJointsDoToTheMessagesWhatEachHypothesisDoes) {
     }
   }
   EXPECT_GT(tried, 100U);
+}
+
+TEST(LegChanges, AJointWhoseMessageAnotherOneReadsAsWellIsChangedItself) {
+  test::Random random(7);
+  Robot robot = test::biped(random);
+  robot.joints = {{"left_2", {"left_4", 1, 0}}, {"left_4", {"", -1, 0}}};
+  const Recorded recorded = some_messages(random);
+  RecordedLegs legs(recorded);
+  LegHypothesis h;
+  h.position = [place = std::ranges::find(recorded.joint_names, "left_4") - recorded.joint_names.begin()](std::size_t i, double& q) {
+    if (static_cast<std::ptrdiff_t>(i) == place) q = -q;
+  };
+  const Robot after = changed(robot, changes_of(legs, robot, h));
+  EXPECT_LT(distance(legs.path(robot, &h, 0, nullptr), legs.path(after, nullptr, 0, nullptr)), 1e-9);
 }
 
 TEST(LegChanges, AnotherUnitOrAnotherLinkIsNoReadingOfAJoint) {

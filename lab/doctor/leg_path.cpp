@@ -1,6 +1,5 @@
 #include "lab/doctor/leg_path.hpp"
 
-#include <algorithm>
 #include <stdexcept>
 
 namespace kilvo::lab {
@@ -13,10 +12,13 @@ LegKinematics RecordedLegs::kinematics(const Robot& robot) {
   return robot.urdf.empty() ? LegKinematics(robot) : LegKinematics(robot, false, &tree(robot));
 }
 
-std::vector<std::string> RecordedLegs::names_of_joints(const Robot& robot) {
-  std::vector<std::string> out = tree(robot).chain(robot.imu.link, robot.feet[0].link).names;
-  for (const std::string& name : tree(robot).chain(robot.imu.link, robot.feet[1].link).names) {
-    if (std::ranges::find(out, name) == out.end()) out.push_back(name);
+std::map<std::string, std::string> RecordedLegs::names_of_joints(const Robot& robot) {
+  Robot as_urdf = robot;
+  as_urdf.joints.clear();
+  std::map<std::string, std::string> out;
+  for (const Foot& foot : robot.feet) {
+    const JointChain joints = tree(as_urdf).chain(robot.imu.link, foot.link), read = tree(robot).chain(robot.imu.link, foot.link);
+    for (std::size_t i = 0; i < joints.names.size(); ++i) out.emplace(joints.names[i], read.names[i]);
   }
   return out;
 }

@@ -45,8 +45,8 @@ class RecordedLegs {
   std::vector<LegPose> path(const Robot& robot, const LegHypothesis* hypothesis, double period, std::string* why);
   /// The joints that move a foot when they turn, by their place in the messages.
   std::vector<std::size_t> joints_that_matter(const Robot& robot);
-  /// The joints between the IMU's link and the feet, by their names in the messages.
-  std::vector<std::string> names_of_joints(const Robot& robot);
+  /// The joints between the IMU's link and the feet, with their names in the messages.
+  std::map<std::string, std::string> names_of_joints(const Robot& robot);
   /// None when the URDF cannot be used.
   LegSides sides(const Robot& robot);
 

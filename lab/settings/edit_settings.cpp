@@ -46,9 +46,26 @@ std::string with_new_key(const std::string& text, const YAML::Node& map, const s
   return std::string(text).insert(at, fmt::format("{}: {}\n{}", name, value, std::string(at - line, ' ')));
 }
 
-}  // namespace
+// Anchors, comments and quotes within a value may make its end another one.
+bool only_differs_in(const YAML::Node& before, const YAML::Node& after, const std::string& key, const std::string& value) {
+  if (!before.IsMap() || !after.IsMap()) return false;
+  const std::size_t dot = key.find('.');
+  const std::string name = key.substr(0, dot);
+  const auto is_concerned = [&](const std::string& other) {
+    return other == name || (name == "R" && (other == "q" || other == "rpy"));  // the same rotation
+  };
+  for (const auto& pair : before) {
+    const std::string other = pair.first.Scalar();
+    if (!is_concerned(other) && YAML::Dump(pair.second) != YAML::Dump(after[other])) return false;
+  }
+  for (const auto& pair : after) {
+    if (!is_concerned(pair.first.Scalar()) && !before[pair.first.Scalar()].IsDefined()) return false;
+  }
+  if (dot != std::string::npos) return only_differs_in(before[name], after[name], key.substr(dot + 1), value);
+  return YAML::Dump(after[name]) == YAML::Dump(YAML::Load(value));
+}
 
-std::string with_setting(const std::string& yaml, const std::string& key, const std::string& value) {
+std::string edited(const std::string& yaml, const std::string& key, const std::string& value) {
   try {
     YAML::Node node = YAML::Load(yaml);
     bool in_flow = false;
@@ -81,6 +98,21 @@ std::string with_setting(const std::string& yaml, const std::string& key, const 
   } catch (const YAML::Exception& error) {
     throw ConfigError(fmt::format("{}: {}", key, error.what()));
   }
+}
+
+}  // namespace
+
+std::string with_setting(const std::string& yaml, const std::string& key, const std::string& value) {
+  const std::string out = edited(yaml, key, value);
+  const auto refuse = [&] {
+    throw ConfigError(fmt::format("{}: the file is written so that it cannot be changed: set it to {}", key, value));
+  };
+  try {
+    if (!only_differs_in(YAML::Load(yaml), YAML::Load(out), key, value)) refuse();
+  } catch (const YAML::Exception&) {
+    refuse();
+  }
+  return out;
 }
 
 }  // namespace kilvo::lab

@@ -23,8 +23,14 @@ TEST(EditSettings, AValueChangesAndNothingElse) {
 TEST(EditSettings, AListOrAMapOverSeveralLinesIsReplacedAsAWhole) {
   const std::string feet = "robot:\n  feet:\n    - {name: left, link: l}  # one\n    - name: right\n      link: r\n  urdf: a.urdf\n";
   EXPECT_EQ(with_setting(feet, "robot.feet", "[]"), "robot:\n  feet:\n    []\n  urdf: a.urdf\n");
-  const std::string joints = "robot:\n  joints:\n    knee: {scale: -1}\n    hip:\n      zero: 0.1\n\n# end\nimu: {rate: 1}\n";
+  const std::string joints = "robot:\n  joints:\n    knee: {sign: -1}\n    hip:\n      zero: 0.1\n\n# end\nimu: {rate: 1}\n";
   EXPECT_EQ(with_setting(joints, "robot.joints", "{}"), "robot:\n  joints:\n    {}\n\n# end\nimu: {rate: 1}\n");
+}
+
+TEST(EditSettings, WhatCannotBeChangedIsRefusedAndNotSpoilt) {
+  for (const std::string feet : {"robot:\n  feet:\n    - name: left\n      sole: &s [1, 2]\n    - name: right\n      sole: *s\n  urdf: a\n",
+                                 "robot:\n  feet: [{name: left,  # one ]\n    link: l}, {name: right}]\n  urdf: a\n"})
+    EXPECT_THROW(with_setting(feet, "robot.feet", "[]"), ConfigError) << feet;
 }
 
 TEST(EditSettings, AMissingKeyJoinsItsSection) {

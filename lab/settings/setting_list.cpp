@@ -77,7 +77,7 @@ std::vector<Setting> list_settings(Settings& s) {
            "the two feet: name (left, right), link of the URDF, sole: corner points of the sole in that link");
   list.own("robot.locked_joints", &robot.locked_joints, "-", "joints between IMU and feet that do not move and are not measured");
   list.own("robot.joints", &robot.joints, "-",
-           "joints of the URDF whose value in the messages differs: JOINT: {from: its name there, scale: -1 where it turns the other way, "
+           "joints of the URDF whose value in the messages differs: JOINT: {from: its name there, sign: -1 where it turns the other way, "
            "zero: added, rad}");
 
   list.own("imu.topic", topic(Sensor::imu), "-", "topic of the IMU");

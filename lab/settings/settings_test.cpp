@@ -202,18 +202,17 @@ TEST(Settings, RangesAreCheckedAlsoTogether) {
 }
 
 TEST(Settings, ReadingsOfJointsAreReadAndShown) {
-  const std::string text = R"({"hip": {"zero": 0.25}, "knee": {"from": "left_knee", "scale": -1}})";
+  const std::string text = R"({"hip": {"zero": 0.25}, "knee": {"from": "left_knee", "sign": -1}})";
   Settings s = parse("robot: {joints: " + text + "}");
   EXPECT_EQ(s.robot.joints.at("knee"), (JointReading{"left_knee", -1, 0}));
   EXPECT_EQ(s.robot.joints.at("hip"), (JointReading{"", 1, 0.25}));
   EXPECT_EQ(value_text(&s.robot.joints), text);
   EXPECT_TRUE(parse("robot: {joints: {}}").robot.joints.empty());
   EXPECT_THAT(error_of("robot: {joints: [knee]}"),
-              HasSubstr("robot.joints: must be a map of joints, JOINT: {from, scale, zero}, not a list"));
-  EXPECT_THAT(error_of("robot: {joints: {knee: -1}}"), HasSubstr("must be {from, scale, zero}, not '-1'"));
-  EXPECT_THAT(error_of("robot: {joints: {knee: {sign: -1}}}"), HasSubstr("'sign': a joint has no such entry, nearest is"));
-  EXPECT_THAT(error_of("robot: {joints: {knee: {scale: 0}}}"),
-              HasSubstr("must be a factor: 1, or -1 where it turns the other way, not '0'"));
+              HasSubstr("robot.joints: must be a map of joints, JOINT: {from, sign, zero}, not a list"));
+  EXPECT_THAT(error_of("robot: {joints: {knee: -1}}"), HasSubstr("must be {from, sign, zero}, not '-1'"));
+  EXPECT_THAT(error_of("robot: {joints: {knee: {scale: -1}}}"), HasSubstr("'scale': a joint has no such entry, nearest is"));
+  EXPECT_THAT(error_of("robot: {joints: {knee: {sign: 0.5}}}"), HasSubstr("must be 1, or -1 where it turns the other way, not '0.5'"));
   EXPECT_THAT(error_of("robot: {joints: {knee: {zero: .inf}}}"), HasSubstr("robot.joints: must be a"));
   EXPECT_THAT(error_of("robot: {joints: {knee: {zero: 1}, knee: {}}}"), HasSubstr("'knee' is given twice"));
 }

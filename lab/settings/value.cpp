@@ -134,18 +134,17 @@ std::array<Foot, 2> read_feet(const YAML::Node& node) {
 }
 
 JointReading read_joint(const YAML::Node& node) {
-  constexpr double least_scale = 1e-4, most = 1000;
-  if (!node.IsMap()) refuse(node, "{from, scale, zero}");
-  const std::vector<std::string> keys{"from", "scale", "zero"};
+  constexpr double most = 1000;  // rad
+  if (!node.IsMap()) refuse(node, "{from, sign, zero}");
+  const std::vector<std::string> keys{"from", "sign", "zero"};
   JointReading out;
   for (const auto& pair : node) {
     const std::string key = pair.first.IsScalar() ? pair.first.Scalar() : std::string();
     if (key == "from") {
       out.from = read_text(pair.second);
-    } else if (key == "scale") {
-      out.scale = read_number(pair.second);
-      if (!(std::abs(out.scale) >= least_scale && std::abs(out.scale) <= most))
-        refuse(pair.second, "a factor: 1, or -1 where it turns the other way");
+    } else if (key == "sign") {
+      out.sign = read_number(pair.second);
+      if (std::abs(out.sign) != 1) refuse(pair.second, "1, or -1 where it turns the other way");
     } else if (key == "zero") {
       out.zero = read_number(pair.second);
       if (!(std::abs(out.zero) <= most)) refuse(pair.second, "an angle in rad");
@@ -157,7 +156,7 @@ JointReading read_joint(const YAML::Node& node) {
 }
 
 std::map<std::string, JointReading> read_joints(const YAML::Node& node) {
-  if (!node.IsMap()) refuse(node, "a map of joints, JOINT: {from, scale, zero}");
+  if (!node.IsMap()) refuse(node, "a map of joints, JOINT: {from, sign, zero}");
   std::map<std::string, JointReading> out;
   for (const auto& pair : node) {
     if (!out.emplace(read_text(pair.first), read_joint(pair.second)).second)

@@ -50,7 +50,7 @@ std::string text_of(const std::map<std::string, JointReading>& joints) {
       entry += fmt::format(R"({}"{}": {})", entry.empty() ? "" : ", ", key, value);
     };
     if (!joint.from.empty()) add("from", json_text(joint.from));
-    if (joint.scale != 1) add("scale", text_of(joint.scale));
+    if (joint.sign != 1) add("sign", text_of(joint.sign));
     if (joint.zero != 0) add("zero", text_of(joint.zero));
     out += fmt::format("{}{}: {{{}}}", out.empty() ? "" : ", ", json_text(name), entry);
   }

@@ -120,8 +120,8 @@ TEST_F(Calibrate, MendsTheDirectionOfAJoint) {
   turn_axes(walk_ + "/robot.urdf", folder_ / "turned.urdf", {"left_knee_joint"}, "0 -1 0");
   const Finished f = calibrate({"robot.urdf=" + std::string(folder_ / "turned.urdf")});
   EXPECT_EQ(f.code, 0) << f.err;
-  EXPECT_THAT(f.err, HasSubstr("mended by robot.joints: {\"left_knee_joint\": {\"scale\": -1}}"));
-  EXPECT_EQ(lab::load_settings(better_, {}).robot.joints.at("left_knee_joint").scale, -1);
+  EXPECT_THAT(f.err, HasSubstr("mended by robot.joints: {\"left_knee_joint\": {\"sign\": -1}}"));
+  EXPECT_EQ(lab::load_settings(better_, {}).robot.joints.at("left_knee_joint").sign, -1);
 }
 
 }  // namespace calibrate_test

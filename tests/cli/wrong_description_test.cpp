@@ -162,7 +162,7 @@ TEST_F(WrongDescription, OfAJointIsMended) {
   const Finished f = run("imu,legs,lidar", "robot.urdf=" + with_knee_turned_round());
   EXPECT_EQ(f.code, 1);
   EXPECT_THAT(f.err, AllOf(HasSubstr("joint left_knee_joint turns the other way round"),
-                           HasSubstr("restarted with robot.joints: {\"left_knee_joint\": {\"scale\": -1}}")));
+                           HasSubstr("restarted with robot.joints: {\"left_knee_joint\": {\"sign\": -1}}")));
   EXPECT_TRUE(std::filesystem::exists(out_ + "/contacts.csv"));
   EXPECT_LT(error(), 0.0013);
 }
@@ -170,7 +170,7 @@ TEST_F(WrongDescription, OfAJointIsMended) {
 TEST_F(WrongDescription, AnImuByItselfIsNoOdometry) {
   const Finished f = kilvo({"run", walk_, "--sensors", "imu,legs", "--drop", "legs:0-", "--out", out_, "--quiet", "--no-map"});
   EXPECT_EQ(f.code, 1);
-  EXPECT_THAT(f.err, HasSubstr("no message of the legs could be used: the positions are integrated from the IMU alone"));
+  EXPECT_THAT(f.err, HasSubstr("no message of legs or LiDAR could be used: the positions are integrated from the IMU alone"));
 }
 
 TEST_F(WrongDescription, ThatNoSettingMendsLeavesTheSenseOut) {
