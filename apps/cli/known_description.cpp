@@ -108,7 +108,7 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
     }
     if (!std::ranges::any_of(wrong, [&](const WrongDescription& w) { return known.stops(w); }))
       known.wrong.insert(known.wrong.end(), again.begin(), again.end());
-    // Whether joints are exchanged is for a person to decide, and with it whatever else is said of joints.
+    // Whether joints are exchanged is for a person to decide, and with it what else would change them.
     const bool undecided = std::ranges::any_of(wrong, [](const WrongDescription& w) { return w.finding.cause == "joints_exchanged"; });
     for (WrongDescription& w : wrong) {
       if (undecided && std::ranges::any_of(w.finding.changes, [](const lab::Change& c) { return c.key == "robot.joints"; }))
