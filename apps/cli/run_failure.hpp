@@ -8,7 +8,7 @@
 
 namespace kilvo::cli {
 
-/// Empty: nothing speaks against them. `with_lidar`: the recording has LiDAR scans.
-std::string failure_of(const RunSummary& run_summary, const Estimator& estimator, bool with_lidar);
+/// Empty: nothing speaks against them. `with_lidar`, `with_legs`: the recording has LiDAR scans, messages of the legs.
+std::string failure_of(const RunSummary& run_summary, const Estimator& estimator, bool with_lidar, bool with_legs);
 
 }  // namespace kilvo::cli

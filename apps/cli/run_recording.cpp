@@ -223,7 +223,9 @@ class Run {
     return fmt::format("{} sweeps, {:.1f} m", files_.run_summary().sweeps(), files_.run_summary().path_length());
   }
   std::string failure(bool interrupted) const {
-    return interrupted ? "stopped by the user" : failure_of(files_.run_summary(), estimator_, !source_.topic(Sensor::lidar).empty());
+    return interrupted
+               ? "stopped by the user"
+               : failure_of(files_.run_summary(), estimator_, !source_.topic(Sensor::lidar).empty(), !source_.topic(Sensor::legs).empty());
   }
 
   void tell_end() const {

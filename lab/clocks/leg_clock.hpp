@@ -10,10 +10,10 @@
 #include <tuple>
 #include <vector>
 
-#include "lab/clocks/link_kinematics.hpp"
 #include "kilvo/math/field.hpp"
 #include "kilvo/sensors/measurement.hpp"
 #include "lab/clocks/device_clock.hpp"
+#include "lab/clocks/link_kinematics.hpp"
 #include "lab/clocks/rate_offset.hpp"
 
 namespace kilvo::lab {

@@ -170,7 +170,7 @@ TEST_F(WrongDescription, OfAJointIsMended) {
 TEST_F(WrongDescription, AnImuByItselfIsNoOdometry) {
   const Finished f = kilvo({"run", walk_, "--sensors", "imu,legs", "--drop", "legs:0-", "--out", out_, "--quiet", "--no-map"});
   EXPECT_EQ(f.code, 1);
-  EXPECT_THAT(f.err, HasSubstr("no message of legs or LiDAR could be used: the positions are integrated from the IMU alone"));
+  EXPECT_THAT(f.err, HasSubstr("no message of the legs could be used: the positions are integrated from the IMU alone"));
 }
 
 TEST_F(WrongDescription, ThatNoSettingMendsLeavesTheSenseOut) {
