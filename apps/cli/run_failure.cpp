@@ -2,7 +2,7 @@
 
 namespace kilvo::cli {
 
-std::string failure_of(const RunSummary& run_summary, const Estimator& estimator, bool with_lidar, bool with_legs) {
+std::string failure_of(const RunSummary& run_summary, const Estimator& estimator, const lab::RecordingSource& source) {
   if (run_summary.outputs() == 0) {
     const std::string why = estimator.waiting_for();
     return "nothing was estimated: " + (why.empty() ? "no measurements" : "still " + why);
@@ -16,8 +16,8 @@ std::string failure_of(const RunSummary& run_summary, const Estimator& estimator
   }
   const bool legs_used = estimator.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
   if (run_summary.sweeps() > 0 || legs_used) return "";
-  if (with_lidar) return "no LiDAR scan could be used";
-  return with_legs ? "no message of the legs could be used: the positions are integrated from the IMU alone" : "";
+  if (!source.topic(Sensor::lidar).empty()) return "no LiDAR scan could be used";
+  return source.topic(Sensor::legs).empty() ? "" : "no message of the legs could be used: the positions are integrated from the IMU alone";
 }
 
 }  // namespace kilvo::cli

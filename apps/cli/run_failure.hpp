@@ -5,10 +5,11 @@
 
 #include "apps/cli/run_summary.hpp"
 #include "kilvo/estimator/estimator.hpp"
+#include "lab/recordings/recording_source.hpp"
 
 namespace kilvo::cli {
 
-/// Empty: nothing speaks against them. `with_lidar`, `with_legs`: the recording has LiDAR scans, messages of the legs.
-std::string failure_of(const RunSummary& run_summary, const Estimator& estimator, bool with_lidar, bool with_legs);
+/// Empty: nothing speaks against them. Sensors that are not read from `source` are not missed.
+std::string failure_of(const RunSummary& run_summary, const Estimator& estimator, const lab::RecordingSource& source);
 
 }  // namespace kilvo::cli

@@ -223,9 +223,8 @@ class Run {
     return fmt::format("{} sweeps, {:.1f} m", files_.run_summary().sweeps(), files_.run_summary().path_length());
   }
   std::string failure(bool interrupted) const {
-    return interrupted ? "stopped by the user" : failure_of(files_.run_summary(), estimator_, has(Sensor::lidar), has(Sensor::legs));
+    return interrupted ? "stopped by the user" : failure_of(files_.run_summary(), estimator_, source_);
   }
-  bool has(Sensor s) const { return !source_.topic(s).empty(); }
 
   void tell_end() const {
     const RunSummary& run_summary = files_.run_summary();
