@@ -92,11 +92,7 @@ TEST(LegKinematics, VelocitiesAreTheDerivativesOfThePositions) {
   constexpr double h = 1e-6;
   for (int i = 0; i < 50; ++i) {
     const JointSample s = test::random_joints(random);
-    JointSample before = s, after = s;
-    for (std::size_t j = 0; j < s.position.size(); ++j) {
-      before.position[j] -= h * s.velocity[j];
-      after.position[j] += h * s.velocity[j];
-    }
+    const auto [before, after] = test::around(s, h);
     const Feet now = feet_of(legs, s), a = feet_of(legs, before), b = feet_of(legs, after);
     for (std::size_t side = 0; side < 2; ++side) {
       for (std::size_t k = 0; k < 4; ++k) {

@@ -28,11 +28,7 @@ TEST(LinkKinematics, ThePelvisMovesAsItsPosesDo) {
   constexpr double h = 1e-6;
   for (int i = 0; i < 20; ++i) {
     const JointSample s = test::random_joints(random);
-    JointSample before = s, after = s;
-    for (std::size_t j = 0; j < s.position.size(); ++j) {
-      before.position[j] -= h * s.velocity[j];
-      after.position[j] += h * s.velocity[j];
-    }
+    const auto [before, after] = test::around(s, h);
     const LinkMotion now = *pelvis.at(s), a = *pelvis.at(before), b = *pelvis.at(after);
     EXPECT_GT(now.omega.norm(), 1e-3);
     EXPECT_LT((now.v - (b.T_IL.p - a.T_IL.p) / (2 * h)).norm(), 1e-7);

@@ -1,4 +1,4 @@
-// Settings that do to the messages of the legs what a hypothesis does.
+// Settings that do to the messages of the legs what a hypothesis does, and whether any hypothesis explains how they turn.
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
@@ -42,7 +42,7 @@ std::vector<Change> changes_of(RecordedLegs& legs, const Robot& robot, const Leg
       h.position(place, one);
     }
     const double direction = one - zero;
-    if (std::abs(std::abs(direction) - 1) > 1e-9) return {};  // of another unit, which no joint's velocity would have
+    if (std::abs(std::abs(direction) - 1) > 1e-9) return {};  // a unit is no sign
     reading.zero += reading.sign * zero;
     reading.sign *= direction > 0 ? 1 : -1;
   }

@@ -96,20 +96,9 @@ TEST_F(Calibrate, ChangesNothingThatIsRight) {
   EXPECT_THAT(f.err, HasSubstr("better.yaml with 0 settings changed"));
 }
 
-// The robot's URDF with another axis of these joints.
-void turn_axes(const std::string& from, const std::string& to, const std::vector<std::string>& joints, const std::string& xyz) {
-  std::string urdf = read_text(from);
-  for (const std::string& name : joints) {
-    const std::size_t joint = urdf.find("<joint name=\"" + name), axis = urdf.find("xyz=\"0 1 0\"", urdf.find("<axis", joint));
-    ASSERT_NE(axis, std::string::npos) << name;
-    urdf.replace(axis, 11, "xyz=\"" + xyz + "\"");
-  }
-  write_text(to, urdf);
-}
-
 TEST_F(Calibrate, RefusesWhatNoSettingMends) {
   // Knees that bend to the side.
-  turn_axes(walk_ + "/robot.urdf", folder_ / "turned.urdf", {"left_knee_joint", "right_knee_joint"}, "1 0 0");
+  write_text(folder_ / "turned.urdf", with_axis(read_text(walk_ + "/robot.urdf"), {"left_knee_joint", "right_knee_joint"}, "1 0 0"));
   const Finished f = calibrate({"robot.urdf=" + std::string(folder_ / "turned.urdf")});
   EXPECT_EQ(f.code, 1);
   EXPECT_THAT(f.err, HasSubstr("no setting mends it"));
@@ -117,7 +106,7 @@ TEST_F(Calibrate, RefusesWhatNoSettingMends) {
 }
 
 TEST_F(Calibrate, MendsTheDirectionOfAJoint) {
-  turn_axes(walk_ + "/robot.urdf", folder_ / "turned.urdf", {"left_knee_joint"}, "0 -1 0");
+  write_text(folder_ / "turned.urdf", with_axis(read_text(walk_ + "/robot.urdf"), {"left_knee_joint"}, "0 -1 0"));
   const Finished f = calibrate({"robot.urdf=" + std::string(folder_ / "turned.urdf")});
   EXPECT_EQ(f.code, 0) << f.err;
   EXPECT_THAT(f.err, HasSubstr("mended by robot.joints: {\"left_knee_joint\": {\"sign\": -1}}"));

@@ -11,6 +11,19 @@
 
 namespace kilvo::stories {
 
+/// A URDF with another axis of these joints, which turn about y.
+inline std::string with_axis(std::string urdf, const std::vector<std::string>& joints, const std::string& xyz) {
+  for (const std::string& name : joints) {
+    const std::size_t joint = urdf.find("<joint name=\"" + name), axis = urdf.find("xyz=\"0 1 0\"", urdf.find("<axis", joint));
+    if (joint == std::string::npos || axis == std::string::npos) {
+      ADD_FAILURE() << "no joint " << name;
+      return "";
+    }
+    urdf.replace(axis, 11, "xyz=\"" + xyz + "\"");
+  }
+  return urdf;
+}
+
 /// A folder with a good configuration and, once made, a recording.
 class Story : public testing::Test {
  protected:

@@ -35,22 +35,12 @@ class WrongDescription : public testing::Test {
     const double a = degrees * 0.01745329251994;
     return fmt::format("lidar.T_imu_lidar.R=[{0}, 0, {1}, 0, 1, 0, -{1}, 0, {0}]", std::cos(a), std::sin(a));
   }
-  /// The robot's URDF with another axis of these joints.
-  std::string with_axis(const std::vector<std::string>& joints, const std::string& xyz) const {
-    std::string urdf = read_text(walk_ + "/robot.urdf");
-    for (const std::string& name : joints) {
-      const std::size_t joint = urdf.find("<joint name=\"" + name), axis = urdf.find("xyz=\"0 1 0\"", urdf.find("<axis", joint));
-      if (joint == std::string::npos || axis == std::string::npos) {
-        ADD_FAILURE() << "no joint " << name;
-        return "";
-      }
-      urdf.replace(axis, 11, "xyz=\"" + xyz + "\"");
-    }
-    std::ofstream(folder_ / "turned.urdf") << urdf;
+  std::string turned(const std::vector<std::string>& joints, const std::string& xyz) const {
+    write_text(folder_ / "turned.urdf", with_axis(read_text(walk_ + "/robot.urdf"), joints, xyz));
     return folder_ / "turned.urdf";
   }
-  std::string with_knee_turned_round() const { return with_axis({"left_knee_joint"}, "0 -1 0"); }
-  std::string with_knees_that_bend_sideways() const { return with_axis({"left_knee_joint", "right_knee_joint"}, "1 0 0"); }
+  std::string with_knee_turned_round() const { return turned({"left_knee_joint"}, "0 -1 0"); }
+  std::string with_knees_that_bend_sideways() const { return turned({"left_knee_joint", "right_knee_joint"}, "1 0 0"); }
 
   /// The URDF of a robot that is 1.6 times as large.
   std::string of_larger_robot() const {

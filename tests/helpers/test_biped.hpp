@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kilvo/sensors/measurement.hpp"
@@ -71,6 +72,16 @@ inline JointSample random_joints(Random& random) {
   }
   s.names = names;
   return s;
+}
+
+/// The joints h seconds earlier and later, at the velocities of the sample.
+inline std::pair<JointSample, JointSample> around(const JointSample& s, double h) {
+  JointSample before = s, after = s;
+  for (std::size_t j = 0; j < s.position.size(); ++j) {
+    before.position[j] -= h * s.velocity[j];
+    after.position[j] += h * s.velocity[j];
+  }
+  return {before, after};
 }
 
 inline Eigen::Isometry3d transform_of(const BipedJoint& j, const JointSample& s) {
