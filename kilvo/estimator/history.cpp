@@ -39,21 +39,28 @@ Estimate History::record_from(const Estimate& e, Time until) {
   return ahead;
 }
 
-std::optional<History> History::doubted(Time middle, Time end, std::optional<double> off) const {
-  constexpr double most = 0.5;  // m/s, with which a sweep still has its shape
-  // What pushed the robot may have done so before the base, if that is an image: since the last sweep.
-  const double before = swept_ ? std::max(0.0, to_seconds(base_.t - *swept_)) : 0;
-  const double since = to_seconds(middle - base_.t), sigma = off.value_or(0) / (before + since);
-  if (to_seconds(end - base_.t) + before > to_seconds(longest_correction) || !(before + since > 0) || sigma > most) return std::nullopt;
+std::optional<History> History::doubted(Time end) const {
+  if (end - base_.t > longest_correction) return std::nullopt;
   std::optional<History> out(*this);
-  if (!off) {
-    out->replay_.doubt_acceleration(base_);
-  } else {
-    Eigen::Matrix<double, at::size, 3> moved = sigma * Covariance::Identity().middleCols<3>(at::v);
-    moved.middleRows<3>(at::p).diagonal().setConstant(sigma * before);
-    out->base_.P += moved * moved.transpose();
-    out->replay_.forget_estimates();
-  }
+  out->replay_.doubt_acceleration(base_);
+  return out;
+}
+
+std::optional<History> History::loosened(Time middle, double turned, double moved, bool biases) const {
+  // It may have begun before the base, if that is an image: since the last sweep.
+  const double before = swept_ ? std::max(0.0, to_seconds(base_.t - *swept_)) : 0, since = before + to_seconds(middle - base_.t);
+  if (!(since > 0) || since > to_seconds(longest_correction)) return std::nullopt;
+  std::optional<History> out(*this);
+  Covariance& P = out->base_.P;
+  const double velocity = moved / since;
+  Eigen::Matrix<double, at::size, 3> pushed = velocity * Covariance::Identity().middleCols<3>(at::v);
+  pushed.middleRows<3>(at::p).diagonal().setConstant(velocity * before);
+  P += pushed * pushed.transpose();
+  const auto inflate = [&P](int part, double sigma) { P.diagonal().segment<3>(part).array() += sigma * sigma; };
+  inflate(at::R, turned);
+  if (biases) inflate(at::bg, turned / since);
+  if (biases) inflate(at::ba, moved / (since * since));
+  out->replay_.forget_estimates();
   return out;
 }
 

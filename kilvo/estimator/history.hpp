@@ -32,10 +32,13 @@ class History {
 
   /// The estimate of a time not before the base. The poses up to then are in the trajectory.
   Estimate at(Time t) { return record_from(base_, t); }
-  /// For a sweep around `middle` until `end`: a history that does not trust the accelerometer since the base; or, if the sweep is `off` by
-  /// so much (m), one whose velocity since the last sweep is less certain, and so the position. None when it is too long ago, or too much.
-  /// now() and closed() stay.
-  std::optional<History> doubted(Time middle, Time end, std::optional<double> off) const;
+  /// For a sweep until `end`: a history that does not trust the accelerometer since the base. None when that is too long ago. now() and
+  /// closed() stay.
+  std::optional<History> doubted(Time end) const;
+  /// A history in which the pose that is predicted from the last sweep to `middle` may be off by so much, rad and m, and the rates since
+  /// then with it; if `biases` are doubted, those of the IMU may have become others. None when that sweep is too long ago. now() and
+  /// closed() stay.
+  std::optional<History> loosened(Time middle, double turned, double moved, bool biases) const;
   /// The estimate at `until` if it was `e` before. The poses in between are in the trajectory.
   Estimate record_from(const Estimate& e, Time until);
   /// Poses of the trajectory at `t` and at the base; the same twice when `t` is not before the base, none when it is too long before.

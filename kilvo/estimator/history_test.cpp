@@ -139,9 +139,8 @@ TEST(History, ACorrectionIsNoMotionOfTheTrajectory) {
   EXPECT_NEAR((slower.p - (early.inverse() * late).p).norm(), 0.07, 0.02);
 }
 
-// Images between two sweeps are the base soon before the second one: a push that the sweep shows came with the velocity of 100 ms, not
-// of 10.
-TEST(History, ASweepThatIsOffIsDoubtedSinceTheSweepBeforeNotSinceTheImageBetween) {
+// Images between two sweeps are the base soon before the second one: what the sweep shows came with rates of 100 ms, not of 10.
+TEST(History, APredictionThatIsDoubtedMayHaveBeenOffSinceTheSweepBeforeNotSinceTheImageBetween) {
   History history{EstimatorConfig{}};
   history.begin(first_estimate(), std::nullopt);
   play(history, 0, 200);
@@ -149,28 +148,31 @@ TEST(History, ASweepThatIsOffIsDoubtedSinceTheSweepBeforeNotSinceTheImageBetween
   const Estimate at_sweep = history.at(middle - milliseconds(100));
   history.correlate_with_sweep(at_sweep.t + milliseconds(50), at_sweep, at_sweep, true, false);
   history.rebase(history.at(middle - milliseconds(10)));
-  constexpr double off = 0.01;
-  auto doubted = history.doubted(middle, middle + milliseconds(50), off);
-  ASSERT_TRUE(doubted);
-  const Covariance more = doubted->at(middle).P - history.at(middle).P;
-  for (const int axis : {0, 1, 2}) {
-    EXPECT_NEAR(std::sqrt(more(at::p + axis, at::p + axis)), off, 1e-6);
-    EXPECT_NEAR(std::sqrt(more(at::v + axis, at::v + axis)), off / 0.1, 1e-5);
-  }
-  EXPECT_FALSE(history.doubted(middle, middle + milliseconds(251), off)) << "more than 0.3 s after the sweep before";
+  constexpr double turned = 0.02, moved = 0.01;
+  const auto more = [&](bool biases) {
+    return Covariance(history.loosened(middle, turned, moved, biases).value().base().P - history.base().P);
+  };
+  const auto sigma = [](const Covariance& P, int part) { return std::sqrt(P(part + 1, part + 1)); };
+  EXPECT_NEAR(sigma(more(true), at::R), turned, 1e-9);
+  EXPECT_NEAR(sigma(more(true), at::p), 0.9 * moved, 1e-9) << "with the velocity, until the base";
+  EXPECT_NEAR(sigma(more(true), at::v), moved / 0.1, 1e-9);
+  EXPECT_NEAR(sigma(more(true), at::bg), turned / 0.1, 1e-9);
+  EXPECT_NEAR(sigma(more(true), at::ba), moved / 0.01, 1e-9);
+  EXPECT_NEAR(sigma(more(false), at::v), moved / 0.1, 1e-9);
+  EXPECT_EQ(sigma(more(false), at::bg), 0);
+  EXPECT_EQ(sigma(more(false), at::ba), 0);
+  EXPECT_FALSE(history.loosened(middle + milliseconds(201), turned, moved, true)) << "more than 0.3 s after the sweep before";
 }
 
-TEST(History, BeforeAnySweepIsUsedAPushIsDoubtedSinceTheBase) {
+TEST(History, BeforeAnySweepIsUsedAPredictionIsDoubtedSinceTheBase) {
   History history{EstimatorConfig{}};
   history.begin(first_estimate(), std::nullopt);
   play(history, 0, 200);
   const Time middle = history_start + milliseconds(150);
   history.rebase(history.at(middle - milliseconds(50)));
-  auto doubted = history.doubted(middle, middle + milliseconds(50), 0.01);
-  ASSERT_TRUE(doubted);
-  const Covariance more = doubted->base().P - history.base().P;
-  EXPECT_TRUE((more.topLeftCorner<6, 6>().isZero(0)));
-  EXPECT_NEAR(more(at::v, at::v), 0.2 * 0.2, 1e-9);
+  const auto loosened = history.loosened(middle, 0, 0.01, false);
+  ASSERT_TRUE(loosened);
+  EXPECT_NEAR(loosened->base().P(at::v, at::v) - history.base().P(at::v, at::v), 0.2 * 0.2, 1e-9);
 }
 
 TEST(History, HowTheImuMovedIsKnownFromShortlyBeforeTheBase) {

@@ -71,7 +71,7 @@ bool MovingStart::register_part(const LidarScan& part, History& history, PointDr
   Estimate prior = history.at(end - (end - begin) / 2);
   history.record_from(prior, end);
   if (map_.surfaces().empty()) begin_map(prior);
-  const Registration sweep = map_.register_sweep(lidar_, part, end, true, history, prior, PoseCovariance::Zero(), drops);
+  const Registration sweep = map_.register_sweep(lidar_, {part, end, true}, history, prior, drops);
   if (sweep.refused || !is_plausible(sweep.posterior) || !is_definite(sweep.posterior.P)) return false;
   history.correct_trajectory(sweep.posterior, sweep.posterior.x.v - prior.x.v);
   lidar_.accept(sweep);

@@ -49,7 +49,8 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   Statistics& statistics = findings_.statistics();
   const bool first = map_.surfaces().empty(), without_legs = !status_.has_legs();
   const Registration sweep =
-      map_.register_sweep(lidar_, scan, end, without_legs, history_, prior, legs_.description_error(prior.x), statistics.points);
+      map_.register_sweep(lidar_, {scan, end, without_legs, legs_.description_error(prior.x)}, history_, prior, statistics.points);
+  if (map_.prediction().lasts()) findings_.report(situation(), Sensor::imu, Reason::contradicted, map_.prediction().error()->moved);
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
   if (sweep.refused) {

@@ -29,34 +29,65 @@ void WorldMap::learn(const Registration& sweep, const PoseCovariance& unobservab
   surfaces_.forget(sweep.posterior.x.p);
 }
 
-// Where the prior is uncertain for what the accelerometer reported alone, the sweep fits where nothing has pushed the robot; where it fits,
-// a push was not what was reported, and the velocity that it gave is not known.
-Registration WorldMap::register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool without_legs, History& history,
-                                      Estimate& prior, const PoseCovariance& considered, PointDrops& drops) const {
+Registration WorldMap::measure(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior,
+                               PointDrops& drops) const {
   const PoseCovariance error = error_at(prior.x.pose());
-  const ProcessNoise noise = history.replay().noise_within(prior.t - (end - prior.t), end);
+  const ProcessNoise noise = history.replay().noise_within(prior.t - (sweep.end - prior.t), sweep.end);
   // The error of a given map is not the drift's.
   Estimate relative = prior;
   const PoseCovariance released =
-      without_legs && !is_given_ ? lidar.release(relative, error, surfaces_.leaf_size() / 2) : PoseCovariance(PoseCovariance::Zero());
-  Registration sweep =
-      lidar.measure(scan, {end, relative, history.trajectory(), noise, error + released, without_legs, considered}, surfaces_, drops);
-  if (sweep.carries) sweep.released = released;
-  if (!sweep.carries) sweep.posterior = prior;
-  const bool is_surprised = lidar.is_surprised(prior, sweep, error);
-  if ((sweep.refused != Reason::fits_nowhere && !is_surprised) || (sweep.refused && !sweep.searched)) return sweep;
-  auto doubted = history.doubted(prior.t, end, sweep.refused ? std::nullopt : std::optional((sweep.posterior.x.p - prior.x.p).norm()));
-  if (!doubted) return sweep;
-  const Estimate expected = doubted->at(prior.t);
-  doubted->record_from(expected, end);
-  PointDrops counted;
-  const PoseCovariance error_there = error_at(expected.x.pose());
-  Registration again =
-      lidar.measure(scan, {end, expected, doubted->trajectory(), noise, error_there, without_legs, considered}, surfaces_, counted);
-  if (again.refused || !again.carries || (!sweep.refused && !LidarPipeline::agrees(expected, again, error_there))) return sweep;
-  history = std::move(*doubted);
-  prior = expected;
-  return again;
+      sweep.without_legs && !is_given_ ? lidar.release(relative, error, surfaces_.leaf_size() / 2) : PoseCovariance(PoseCovariance::Zero());
+  const LidarPipeline::Context context = {sweep.end,        relative,           history.trajectory(), noise,
+                                          error + released, sweep.without_legs, sweep.considered};
+  Registration out = lidar.measure(sweep.scan, context, surfaces_, drops);
+  if (out.carries) out.released = released;
+  if (!out.carries) out.posterior = prior;
+  return out;
+}
+
+// Where the prior is uncertain for what the accelerometer reported alone, the sweep fits where nothing has pushed the robot.
+Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, History& history, Estimate& prior, PointDrops& drops) {
+  const auto go_on_with = [&](History&& other) {
+    history = std::move(other);
+    prior = history.at(prior.t);
+    history.record_from(prior, sweep.end);
+  };
+  const State predicted = prior.x;
+  if (const auto& e = prediction_.error()) {
+    if (auto looser = history.loosened(prior.t, e->turned, e->moved, prediction_.lasts())) go_on_with(std::move(*looser));
+  }
+  Registration out = measure(lidar, sweep, history, prior, drops);
+  PointDrops counted;  // before
+  const auto try_again_with = [&](std::optional<History> other, const auto& is_right) {
+    if (!other) return false;
+    const Estimate expected = other->at(prior.t);
+    other->record_from(expected, sweep.end);
+    Registration again = measure(lidar, sweep, *other, expected, counted);
+    if (again.refused || !again.carries || !is_right(expected, again)) return false;
+    history = std::move(*other);
+    prior = expected;
+    out = std::move(again);
+    return true;
+  };
+  const auto explains = [&](const Estimate&, const Registration& again) { return prediction_.explains(again, out); };
+  const auto agrees = [&](const Estimate& expected, const Registration& again) {
+    return LidarPipeline::squared_change(expected, again, error_at(expected.x.pose())) < LidarPipeline::agreeing_change;
+  };
+  const auto surprise = lidar.is_rejoining() ? PredictionCheck::Surprise::none : prediction_.surprise(prior, out, error_at(prior.x.pose()));
+  const bool is_contradicted = prediction_.contradicts(out);
+  if (is_contradicted || surprise == PredictionCheck::Surprise::again) {
+    const Registration near = measure(lidar, sweep, history, PredictionCheck::released(prior), counted);
+    const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
+    const bool is_right = is_contradicted ? prediction_.explains(near, out) : near.carries && !near.refused;
+    auto looser = is_right ? history.loosened(prior.t, off.turned, off.moved, false) : std::nullopt;
+    if (is_contradicted ? try_again_with(std::move(looser), explains) : try_again_with(std::move(looser), agrees)) prediction_.begin(off);
+  } else if (surprise == PredictionCheck::Surprise::first) {
+    try_again_with(history.loosened(prior.t, 0, (out.posterior.x.p - prior.x.p).norm(), false), agrees);
+  } else if (out.searched && out.refused == Reason::fits_nowhere) {
+    try_again_with(history.doubted(sweep.end), [](const auto&...) { return true; });
+  }
+  prediction_.learn(predicted, out);
+  return out;
 }
 
 bool WorldMap::refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time end) {
@@ -67,6 +98,7 @@ bool WorldMap::refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time en
 
 void WorldMap::begin_anew(const Estimate& e) {
   surfaces_ = VoxelMap(config_);
+  prediction_ = {};
   // The robot may be anywhere within these.
   constexpr double moved = 5.0, climbed = 1.0, turned = 0.5;  // m, m, rad
   PoseCovariance unknown = PoseCovariance::Zero();

@@ -3,7 +3,7 @@
 
 #include "kilvo/estimator/history.hpp"
 #include "kilvo/estimator/map_error.hpp"
-#include "kilvo/lidar/lidar_pipeline.hpp"
+#include "kilvo/estimator/prediction_check.hpp"
 #include "kilvo/map/voxel_map.hpp"
 
 namespace kilvo {
@@ -24,10 +24,17 @@ class WorldMap {
   PoseCovariance error_at(const SE3& T_WI) const { return error_.at(T_WI); }
   const MapError& error() const { return error_; }
 
-  /// Registers a sweep until `end` from `prior`, of its middle. Where it is not for what the accelerometer reported, that is doubted: then
-  /// `history` and `prior` become what they are without. `without_legs`, `considered`: see LidarPipeline::Context; `drops` counts.
-  Registration register_sweep(LidarPipeline& lidar, const LidarScan& scan, Time end, bool without_legs, History& history, Estimate& prior,
-                              const PoseCovariance& considered, PointDrops& drops) const;
+  struct Sweep {
+    const LidarScan& scan;
+    Time end;
+    bool without_legs = false;                           // see LidarPipeline::Context
+    PoseCovariance considered = PoseCovariance::Zero();  // see Registration
+  };
+  /// Registers a sweep from `prior`, of its middle. Where it is not for what the IMU reported, that is doubted: then `history` and `prior`
+  /// become what they are without. `drops` counts.
+  Registration register_sweep(LidarPipeline& lidar, const Sweep& sweep, History& history, Estimate& prior, PointDrops& drops);
+  /// Whether the IMU predicts what sweeps find.
+  const PredictionCheck& prediction() const { return prediction_; }
   /// A sweep fitted nowhere. True when that has lasted: the robot is taken to be outside of the map, and it restarts around `prior`,
   /// unless it was given.
   bool refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time end);
@@ -45,11 +52,14 @@ class WorldMap {
   void begin_anew(const Estimate& e);
 
  private:
+  Registration measure(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior, PointDrops& drops) const;
+
   MapConfig config_;
   LidarConfig lidar_;
   Eigen::Vector3d p_IL_;  // m
   VoxelMap surfaces_;
   MapError error_;
+  PredictionCheck prediction_;
   bool is_given_ = false;
 };
 

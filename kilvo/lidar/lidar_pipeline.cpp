@@ -23,9 +23,6 @@ constexpr int fewest_rows = 30, most_weak = 3;
 // planes and move the pose by hundredths of a millimetre.
 constexpr double negligible_turn = 5e-4, negligible_step = 3e-3;  // rad, m
 
-// Of chi-square with six degrees of freedom.
-constexpr double six_at_99_9 = 22.46;
-
 bool says_enough(const RegistrationReport& report) { return report.matched >= fewest_rows && report.degeneracy.weak_count <= most_weak; }
 
 // A scan that was undistorted with a velocity that is not known: its ends are out of place, at the worst all on one side.
@@ -37,14 +34,6 @@ PoseCovariance noise_of_velocity(const Covariance& P, double rate) {
   out.diagonal().head<3>().setConstant(per_metre * per_metre * smear);
   out.diagonal().tail<3>().setConstant(on_one_side * on_one_side * smear);
   return out;
-}
-
-// How far the sweep moved the pose, per covariance of the prior.
-double squared_change(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
-  PoseCovariance P = prior.P.topLeftCorner<6, 6>() + map_error + sweep.considered;
-  P.diagonal().array() += 1e-6;
-  const Eigen::Matrix<double, 6, 1> change = boxminus(sweep.posterior.x, prior.x).head<6>();
-  return change.dot(P.ldlt().solve(change));
 }
 
 // Of sound sweeps nine tenths of what meets a surface lies on it, in a crowd as well.
@@ -179,21 +168,11 @@ void LidarPipeline::accept(const Registration& sweep) {
   refused_since_.reset();
 }
 
-bool LidarPipeline::is_surprised(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
-  const int expected = std::exchange(expected_sweeps_, 0);
-  if (sweep.refused || !sweep.carries || sweep.searched || is_rejoining() || sweep.report.matched == 0) return false;
-  const double change = squared_change(prior, sweep, map_error);
-  constexpr double unusual = 8, memory = 50;  // -, sweeps
-  const bool out = change > std::max(six_at_99_9, unusual * usual_change_);
-  usual_change_ += (std::min(change, six_at_99_9) - usual_change_) / memory;
-  if (!out) expected_sweeps_ = expected + 1;
-  // What goes on is no push.
-  constexpr int before = 5;  // sweeps
-  return out && expected >= before;
-}
-
-bool LidarPipeline::agrees(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
-  return squared_change(prior, sweep, map_error) < six_at_99_9;
+double LidarPipeline::squared_change(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
+  PoseCovariance P = prior.P.topLeftCorner<6, 6>() + map_error + sweep.considered;
+  P.diagonal().array() += 1e-6;
+  const Eigen::Matrix<double, 6, 1> change = boxminus(sweep.posterior.x, prior.x).head<6>();
+  return change.dot(P.ldlt().solve(change));
 }
 
 bool LidarPipeline::may_learn(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
@@ -201,7 +180,7 @@ bool LidarPipeline::may_learn(const Estimate& prior, const Registration& sweep, 
   constexpr double agreeing_share = 0.6;
   const int met = sweep.report.matched + sweep.report.rejected;
   if (met < known_share * sweep.report.clusters) return true;
-  const bool consistent = sweep.report.matched > agreeing_share * met && agrees(prior, sweep, map_error);
+  const bool consistent = sweep.report.matched > agreeing_share * met && squared_change(prior, sweep, map_error) < agreeing_change;
   sweeps_to_go_ = consistent ? sweeps_to_go_ - 1 : consistent_sweeps;
   return !is_rejoining();
 }

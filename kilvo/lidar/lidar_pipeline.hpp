@@ -72,12 +72,10 @@ class LidarPipeline {
   /// An empty map takes the sweep as it is. `drops`: counts the points that are not used.
   Registration measure(const LidarScan& scan, const Context& context, const VoxelMap& map, PointDrops& drops);
 
-  /// The sweep was registered much farther from `prior` than the covariance says and than sweeps usually are, and those before it were not.
-  /// `map_error`: of the map around the prior.
-  bool is_surprised(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
-
-  /// It is where the covariance says.
-  static bool agrees(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
+  /// How far the sweep moved the pose from `prior`, squared, per covariance there. `map_error`: of the map around the prior.
+  static double squared_change(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
+  /// Of sweeps that are where the covariance says: chi-square with six degrees of freedom, 99.9 %.
+  static constexpr double agreeing_change = 22.46;
 
   /// The registration is used: which directions it knew is remembered.
   void accept(const Registration& sweep);
@@ -122,8 +120,6 @@ class LidarPipeline {
   RangeNoise range_noise_;
   BlindDirections blind_;
   PoseCovariance unknowable_ = PoseCovariance::Zero();  // of blind_.part() what is for the world around: it is not searched for
-  double usual_change_ = 0;                             // mean of squared changes by sweeps, per covariance of the prior
-  int expected_sweeps_ = 0;                             // in a row, that were where they usually are
   int sweeps_to_go_ = 0;                                // consistent sweeps before the map grows again
   std::optional<Time> refused_since_;                   // sweeps that fit nowhere
   std::optional<Time> searched_since_;                  // sweeps that had to be found

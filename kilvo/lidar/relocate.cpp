@@ -11,8 +11,6 @@
 namespace kilvo {
 namespace {
 
-// The nearest planes are the right ones within so much, m and rad (one sigma).
-constexpr double well_known_position = 0.08, well_known_rotation = 0.03;
 // The grid: what a registration starting from its points can reach.
 constexpr double step = 0.25, yaw_step = 0.09;                         // m, rad
 constexpr int most_steps = 8, most_steps_up = 2, most_steps_yaw = 35;  // all round

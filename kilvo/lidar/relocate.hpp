@@ -9,6 +9,9 @@
 
 namespace kilvo {
 
+/// The nearest planes are the right ones within so much, m and rad (one sigma of each axis).
+inline constexpr double well_known_position = 0.08, well_known_rotation = 0.03;
+
 /// Uncertain beyond what registration to the nearest planes bears. `known`: takes a pose error to its part that sweeps know here.
 bool needs_search(const Covariance& P, const PoseCovariance& known);
 

@@ -1,5 +1,7 @@
 // What the senses say of each other: wrong mounts, wrong stamps, samples at the end of a range, a world that changed.
+#include <array>
 #include <cstdio>
+#include <functional>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <limits>
@@ -290,6 +292,37 @@ TEST_F(Senses, AKnockThatNoSampleShowsWholeIsNotTakenForABias) {
   EXPECT_LT(o.worst(&Moment::error, 8.3, 14), as_usual + 0.0015);
   EXPECT_LT(o.worst(&Moment::sigmas, 8.3, 14), 4.0);
   EXPECT_LT(o.worst(&Moment::accel_bias, 5, 14), 0.2);
+}
+
+// What the covariance of an IMU knows nothing of. The sweeps see all of it.
+TEST_F(Senses, AnImuThatMeasuresOtherwiseFromNowOnIsFoundByTheSweeps) {
+  struct Fault {
+    const char* name;
+    std::function<void(ImuSample&)> of;
+  };
+  const std::array faults = {Fault{"bias of the gyro, about the vertical", [](ImuSample& s) { s.gyro.z() += 0.1; }},
+                             Fault{"bias of the gyro, about the walk", [](ImuSample& s) { s.gyro.x() += 0.3; }},
+                             Fault{"bias of the accelerometer, level", [](ImuSample& s) { s.accel.x() += 0.5; }},
+                             Fault{"bias of the accelerometer, upwards", [](ImuSample& s) { s.accel.z() += 2; }},
+                             Fault{"scale of the gyro", [](ImuSample& s) { s.gyro *= 1.1; }},
+                             Fault{"clock", [](ImuSample& s) { s.t += std::chrono::milliseconds(40); }}};
+  for (const Fault& fault : faults) {
+    for (const auto& used : {kil, li}) {
+      SCOPED_TRACE(testing::Message() << fault.name << ", legs " << used[1]);
+      const auto changed = [&fault](Measurement& m, double s) {
+        if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && s >= 8) fault.of(*imu);
+        return true;
+      };
+      // The stamps of the outputs are the IMU's, but where the legs find a step of its clock.
+      const bool follows_clock = &fault == &faults.back() && !used[1];
+      const auto where = [](double s) { return s < 8.04 ? s : s - 0.04; };
+      const Outcome o = walk_->with({}, {used, changed, {}, follows_clock ? where : std::function<double(double)>{}});
+      std::printf("%s, legs %d: worst %.1f mm, at the end %.1f mm; %.1f sigmas\n", fault.name, used[1],
+                  1e3 * o.worst(&Moment::error, 0, 14), 1e3 * o.worst(&Moment::error, 13, 14), o.worst(&Moment::sigmas, 9, 14));
+      EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.1);
+      EXPECT_LT(o.worst(&Moment::error, 13, 14), 0.03);
+    }
+  }
 }
 
 // On the legs alone: both feet seem to rise from then on, which the ground does not let them.
