@@ -23,7 +23,7 @@ void average(PredictionCheck::Error& a, const PredictionCheck::Error& b, double 
 bool PredictionCheck::contradicts(const Registration& sweep) const {
   constexpr int enough = 10;                      // sweeps
   constexpr double clearly = 0.1, by_chance = 4;  // -, standard deviations
-  if (sweeps_ < enough || sweep.searched || met(sweep.report) == 0) return false;
+  if (gives_up() || sweeps_ < enough || sweep.refused || sweep.searched || met(sweep.report) == 0) return false;
   return share_beside(sweep.report) > share_ + std::max(clearly, by_chance * std::sqrt(share_ * (1 - share_) / met(sweep.report)));
 }
 
@@ -37,7 +37,7 @@ PredictionCheck::Surprise PredictionCheck::surprise(const Estimate& prior, const
   usual_change_ += (std::min(change, LidarPipeline::agreeing_change) - usual_change_) / memory;
   if (!out) expected_sweeps_ = expected + 1;
   constexpr int before = 5;  // sweeps
-  surprised_ = out && (was_surprised || expected >= before);
+  surprised_ = out && !gives_up() && (was_surprised || expected >= before);
   return !surprised_ ? Surprise::none : was_surprised ? Surprise::again : Surprise::first;
 }
 
@@ -63,6 +63,8 @@ void PredictionCheck::begin(const Error& off) {
   const Error before = error_.value_or(Error{});
   error_ = {std::max(before.turned, off.turned), std::max(before.moved, off.moved)};
   sweeps_with_error_ = 0;
+  begun_ += 1;
+  if (gives_up()) error_.reset();
 }
 
 void PredictionCheck::learn(const State& predicted, const Registration& sweep) {
@@ -71,6 +73,7 @@ void PredictionCheck::learn(const State& predicted, const Registration& sweep) {
   if (sweep.searched || !sweep.carries || met(sweep.report) == 0) return;
   sweeps_ = std::min(sweeps_ + 1, remembered);
   const double weight = 1.0 / sweeps_;
+  if (!gives_up()) begun_ -= begun_ / remembered;
   share_ += weight * (share_beside(sweep.report) - share_);
   const Error change = error_between(predicted, sweep.posterior.x);
   if (!error_) return average(usual_, change, weight);

@@ -33,16 +33,21 @@ class PredictionCheck {
   /// That has lasted for some sweeps: a shock has passed by then, a bias has not. Once, and again when predictions contradict the sweeps.
   bool lasts() const { return error_ && sweeps_with_error_ == lasting; }
 
+  /// Too often contradicted to be the IMU's: nothing is doubted any more.
+  bool gives_up() const { return begun_ >= too_often; }
+
   /// A sweep was registered from `predicted`, as far as the filter knew before error() was added.
   void learn(const State& predicted, const Registration& sweep);
 
  private:
-  static constexpr int lasting = 5;  // sweeps
+  static constexpr int lasting = 5;       // sweeps
+  static constexpr double too_often = 5;  // contradictions within `remembered` sweeps: no IMU changes so often, the description is wrong
 
   int sweeps_ = 0;    // that were learnt from, at most `remembered`
   double share_ = 0;  // of what met a surface: beside it
   Error usual_;       // root mean square changes by sweeps
   std::optional<Error> error_;
+  double begun_ = 0;           // how often of late predictions contradicted the sweeps
   int sweeps_with_error_ = 0;  // since predictions contradicted the sweeps the last time
   double usual_change_ = 0;    // mean of squared changes by sweeps, per covariance of the prior
   int expected_sweeps_ = 0;    // in a row, that were where they usually are

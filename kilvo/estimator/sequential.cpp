@@ -50,7 +50,10 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   const bool first = map_.surfaces().empty(), without_legs = !status_.has_legs();
   const Registration sweep =
       map_.register_sweep(lidar_, {scan, end, without_legs, legs_.description_error(prior.x)}, history_, prior, statistics.points);
-  if (map_.prediction().lasts()) findings_.report(situation(), Sensor::imu, Reason::contradicted, map_.prediction().error()->moved);
+  if (const PredictionCheck& check = map_.prediction(); check.lasts() || (check.gives_up() && !statistics.diverged))
+    findings_.contradict(check.gives_up() ? Reason::diverged : Reason::inconsistent, Sensor::imu, Sensor::lidar,
+                         check.error().value_or(PredictionCheck::Error{}).moved,
+                         "a bias, the scale or the clock of one has changed, or its mount is wrong", situation());
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
   if (sweep.refused) {

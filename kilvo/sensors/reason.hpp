@@ -68,7 +68,6 @@ enum class Reason : std::uint8_t {
   froze,
   gyro_clipped,
   accel_clipped,
-  contradicted,
   feet_not_still,
   unmeasured,
   map_begun_anew,
@@ -156,11 +155,6 @@ inline constexpr std::array reasons = {
     ReasonRow{Reason::froze, Severity::warning, "froze", "frozen: it repeated its values"},
     ReasonRow{Reason::gyro_clipped, Severity::warning, "gyro_clipped", "the gyroscope is at the end of its range, {} rad/s", 1, 1},
     ReasonRow{Reason::accel_clipped, Severity::warning, "accel_clipped", "the accelerometer is at the end of its range, {} m/s^2", 1, 1},
-    ReasonRow{
-        Reason::contradicted, Severity::warning, "contradicted",
-        "the sweeps contradict the motion that it predicts, by {} mm from one to the next: its bias, scale, noise or clock has changed. "
-        "The sweeps are followed",
-        1e3, 0},
     ReasonRow{Reason::feet_not_still, Severity::warning, "feet_not_still",
               "no foot was at rest in {} % of the messages: check the mount of the IMU and the URDF", 100, 0},
     ReasonRow{
