@@ -81,6 +81,7 @@ void PredictionCheck::learn(const State& predicted, const Registration& sweep) {
   average(*error_, change, 1.0 / remembered_errors);
   if (error_->turned > as_usual * usual_.turned || error_->moved > as_usual * usual_.moved) return;
   error_.reset();
+  sweeps_with_error_ = 0;
 }
 
 }  // namespace kilvo

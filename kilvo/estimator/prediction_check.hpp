@@ -35,6 +35,8 @@ class PredictionCheck {
 
   /// Too often contradicted to be the IMU's: nothing is doubted any more.
   bool gives_up() const { return begun_ >= too_often; }
+  /// That, or contradicted for so long that the estimate is not to be used.
+  bool is_hopeless() const { return gives_up() || sweeps_with_error_ > 4 * lasting; }
 
   /// A sweep was registered from `predicted`, as far as the filter knew before error() was added.
   void learn(const State& predicted, const Registration& sweep);

@@ -23,6 +23,13 @@ std::optional<Eigen::Vector3d> direction_of(const PoseCovariance& part) {
   return position.col(most).normalized();
 }
 
+void judge(const PredictionCheck& check, const Findings::Situation& now, Findings& findings) {
+  if (!check.lasts() && (!check.is_hopeless() || findings.statistics().diverged)) return;
+  findings.contradict(check.is_hopeless() ? Reason::diverged : Reason::inconsistent, Sensor::imu, Sensor::lidar,
+                      check.error().value_or(PredictionCheck::Error{}).moved,
+                      "a bias, the scale or the clock of one has changed, or its mount is wrong", now);
+}
+
 }  // namespace
 
 void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, std::vector<Output>& out) {
@@ -50,10 +57,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   const bool first = map_.surfaces().empty(), without_legs = !status_.has_legs();
   const Registration sweep =
       map_.register_sweep(lidar_, {scan, end, without_legs, legs_.description_error(prior.x)}, history_, prior, statistics.points);
-  if (const PredictionCheck& check = map_.prediction(); check.lasts() || (check.gives_up() && !statistics.diverged))
-    findings_.contradict(check.gives_up() ? Reason::diverged : Reason::inconsistent, Sensor::imu, Sensor::lidar,
-                         check.error().value_or(PredictionCheck::Error{}).moved,
-                         "a bias, the scale or the clock of one has changed, or its mount is wrong", situation());
+  judge(map_.prediction(), situation(), findings_);
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
   if (sweep.refused) {
