@@ -68,8 +68,9 @@ void PredictionCheck::begin(const Error& off) {
 }
 
 void PredictionCheck::learn(const State& predicted, const Registration& sweep) {
-  constexpr int remembered = 50, remembered_errors = 10;  // sweeps
+  constexpr int remembered_errors = 5;  // sweeps
   constexpr double as_usual = 2;
+  if (error_) ++sweeps_with_error_;
   if (sweep.searched || !sweep.carries || met(sweep.report) == 0) return;
   sweeps_ = std::min(sweeps_ + 1, remembered);
   const double weight = 1.0 / sweeps_;
@@ -77,7 +78,6 @@ void PredictionCheck::learn(const State& predicted, const Registration& sweep) {
   share_ += weight * (share_beside(sweep.report) - share_);
   const Error change = error_between(predicted, sweep.posterior.x);
   if (!error_) return average(usual_, change, weight);
-  ++sweeps_with_error_;
   average(*error_, change, 1.0 / remembered_errors);
   if (error_->turned > as_usual * usual_.turned || error_->moved > as_usual * usual_.moved) return;
   error_.reset();

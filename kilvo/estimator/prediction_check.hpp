@@ -35,14 +35,14 @@ class PredictionCheck {
 
   /// Too often contradicted to be the IMU's: nothing is doubted any more.
   bool gives_up() const { return begun_ >= too_often; }
-  /// That, or contradicted for so long that the estimate is not to be used.
-  bool is_hopeless() const { return gives_up() || sweeps_with_error_ > 4 * lasting; }
+  /// That, or contradicted for `remembered` sweeps that the estimate is not to be used.
+  bool is_hopeless() const { return gives_up() || sweeps_with_error_ > remembered; }
 
   /// A sweep was registered from `predicted`, as far as the filter knew before error() was added.
   void learn(const State& predicted, const Registration& sweep);
 
  private:
-  static constexpr int lasting = 5;       // sweeps
+  static constexpr int lasting = 5, remembered = 50;  // sweeps
   static constexpr double too_often = 5;  // contradictions within `remembered` sweeps: no IMU changes so often, the description is wrong
 
   int sweeps_ = 0;    // that were learnt from, at most `remembered`
