@@ -76,7 +76,10 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, 
   const auto surprise = lidar.is_rejoining() ? PredictionCheck::Surprise::none : prediction_.surprise(prior, out, error_at(prior.x.pose()));
   const bool is_contradicted = prediction_.contradicts(out);
   if (is_contradicted || surprise == PredictionCheck::Surprise::again) {
-    const Registration near = measure(lidar, sweep, history, PredictionCheck::released(prior), counted);
+    // With the gate of the prior again: an uncertain one lets almost everything lie on the surfaces.
+    Estimate there = prior;
+    there.x = measure(lidar, sweep, history, PredictionCheck::released(prior), counted).posterior.x;
+    const Registration near = measure(lidar, sweep, history, there, counted);
     const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
     const bool is_right = is_contradicted ? prediction_.explains(near, out) : near.carries && !near.refused;
     auto looser = is_right ? history.loosened(prior.t, off.turned, off.moved, false) : std::nullopt;

@@ -80,7 +80,8 @@ Registration LidarPipeline::measure(const LidarScan& scan, const Context& contex
     return out;
   }
   out.clusters = downsample(out.points, prior.x.pose(), config_.voxel_size, config_.reach());
-  range_noise_.add(out.clusters, mount_.T_imu_lidar.p, config_);
+  // A sweep that is measured again from another prior shows no more of it.
+  if (std::exchange(noise_seen_until_, context.end) != context.end) range_noise_.add(out.clusters, mount_.T_imu_lidar.p, config_);
   out.range_noise = range_noise_.sigma(config_.range_noise);
   LidarConfig config = config_;
   config.range_noise = out.range_noise;

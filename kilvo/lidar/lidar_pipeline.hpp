@@ -118,6 +118,7 @@ class LidarPipeline {
   TimeOffset time_offset_;
   MountError mount_error_;
   RangeNoise range_noise_;
+  Time noise_seen_until_{};
   BlindDirections blind_;
   PoseCovariance unknowable_ = PoseCovariance::Zero();  // of blind_.part() what is for the world around: it is not searched for
   int sweeps_to_go_ = 0;                                // consistent sweeps before the map grows again
