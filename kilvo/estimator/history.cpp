@@ -48,8 +48,10 @@ std::optional<History> History::doubted(Time end) const {
 
 std::optional<History> History::loosened(Time middle, double turned, double moved, bool biases) const {
   // It may have begun before the base, if that is an image: since the last sweep.
-  const double before = swept_ ? std::max(0.0, to_seconds(base_.t - *swept_)) : 0, since = before + to_seconds(middle - base_.t);
-  if (!(since > 0) || since > to_seconds(longest_correction)) return std::nullopt;
+  const double before = swept_ ? std::max(0.0, to_seconds(base_.t - *swept_)) : 0;
+  constexpr double shortest = 0.02, longest = 1.5, noticed = 0.1;  // s; between sweeps, and how soon a bias is found
+  const double since = before + to_seconds(middle - base_.t);
+  if (since < shortest || since > longest) return std::nullopt;
   std::optional<History> out(*this);
   Covariance& P = out->base_.P;
   const double velocity = moved / since;
@@ -58,8 +60,9 @@ std::optional<History> History::loosened(Time middle, double turned, double move
   P += pushed * pushed.transpose();
   const auto inflate = [&P](int part, double sigma) { P.diagonal().segment<3>(part).array() += sigma * sigma; };
   inflate(at::R, turned);
-  if (biases) inflate(at::bg, turned / since);
-  if (biases) inflate(at::ba, moved / (since * since));
+  const double lasted = std::max(since, noticed);
+  if (biases) inflate(at::bg, turned / lasted);
+  if (biases) inflate(at::ba, moved / (lasted * lasted));
   out->replay_.forget_estimates();
   return out;
 }

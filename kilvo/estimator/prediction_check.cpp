@@ -12,42 +12,50 @@ namespace {
 double met(const RegistrationReport& report) { return report.matched + report.rejected; }
 double share_beside(const RegistrationReport& report) { return met(report) > 0 ? report.rejected / met(report) : 0; }
 
-// Moves a root mean square by `weight` towards that of `b`.
-void average(PredictionCheck::Error& a, const PredictionCheck::Error& b, double weight) {
-  a.turned = std::sqrt((1 - weight) * a.turned * a.turned + weight * b.turned * b.turned);
-  a.moved = std::sqrt((1 - weight) * a.moved * a.moved + weight * b.moved * b.moved);
-}
-
-}  // namespace
-
-bool PredictionCheck::contradicts(const Registration& sweep) const {
-  constexpr int enough = 10;                      // sweeps
-  constexpr double clearly = 0.1, by_chance = 4;  // -, standard deviations
-  if (gives_up() || sweeps_ < enough || sweep.refused || sweep.searched || met(sweep.report) == 0) return false;
-  return share_beside(sweep.report) > share_ + std::max(clearly, by_chance * std::sqrt(share_ * (1 - share_) / met(sweep.report)));
-}
-
-PredictionCheck::Surprise PredictionCheck::surprise(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
-  const int expected = std::exchange(expected_sweeps_, 0);
-  const bool was_surprised = std::exchange(surprised_, false);
-  if (sweep.refused || !sweep.carries || sweep.searched || sweep.report.matched == 0) return Surprise::none;
-  const double change = LidarPipeline::squared_change(prior, sweep, map_error);
-  constexpr double unusual = 8, memory = 50;  // -, sweeps
-  const bool out = change > std::max(LidarPipeline::agreeing_change, unusual * usual_change_);
-  usual_change_ += (std::min(change, LidarPipeline::agreeing_change) - usual_change_) / memory;
-  if (!out) expected_sweeps_ = expected + 1;
-  constexpr int before = 5;  // sweeps
-  surprised_ = out && !gives_up() && (was_surprised || expected >= before);
-  return !surprised_ ? Surprise::none : was_surprised ? Surprise::again : Surprise::first;
-}
-
-Estimate PredictionCheck::released(const Estimate& prior) {
-  constexpr double part = 0.7;  // of what would be searched for
+// By so much of what the nearest planes bear.
+Estimate inflated(const Estimate& prior, double part) {
   Estimate out = prior;
   out.P.diagonal().segment<3>(at::R).array() += std::pow(part * well_known_rotation, 2);
   out.P.diagonal().segment<3>(at::p).array() += std::pow(part * well_known_position, 2);
   return out;
 }
+
+bool measures(const Registration& sweep) { return !sweep.refused && sweep.carries && met(sweep.report) > 0; }
+
+}  // namespace
+
+bool PredictionCheck::contradicts(const Registration& sweep) const {
+  constexpr int told_apart = 10;                  // sweeps
+  constexpr double clearly = 0.1, by_chance = 4;  // -, standard deviations
+  if (gives_up() || sweeps_ < told_apart || sweep.refused || sweep.searched || met(sweep.report) == 0) return false;
+  return share_beside(sweep.report) > share_ + std::max(clearly, by_chance * std::sqrt(share_ * (1 - share_) / met(sweep.report)));
+}
+
+bool PredictionCheck::is_unusual(double change) const {
+  constexpr double unusual = 8;
+  return change > std::max(LidarPipeline::agreeing_change, unusual * usual_change_);
+}
+
+PredictionCheck::Surprise PredictionCheck::surprise(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error,
+                                                    bool rejoins) {
+  const int expected = std::exchange(expected_sweeps_, 0), unexpected = std::exchange(unexpected_sweeps_, 0);
+  const bool was_surprised = std::exchange(surprised_, false);
+  if (error_ || rejoins || !measures(sweep) || sweep.searched) return Surprise::none;
+  const double change = LidarPipeline::squared_change(prior, sweep, map_error);
+  const bool out = is_unusual(change);
+  usual_change_ += (std::min(change, LidarPipeline::agreeing_change) - usual_change_) / remembered;
+  if (!out) expected_sweeps_ = expected + 1;
+  if (!out || gives_up()) return Surprise::none;
+  unexpected_sweeps_ = unexpected + 1;
+  constexpr int too_many = 3;  // sweeps
+  if (unexpected_sweeps_ >= too_many || was_surprised) return Surprise::again;
+  surprised_ = expected >= enough;
+  return surprised_ ? Surprise::first : Surprise::none;
+}
+
+Estimate PredictionCheck::released(const Estimate& prior) { return inflated(prior, 0.7); }
+
+Estimate PredictionCheck::lost(const Estimate& prior) { return inflated(prior, 3); }
 
 bool PredictionCheck::explains(const Registration& again, const Registration& sweep) const {
   const double left = share_beside(again.report) - share_, before = share_beside(sweep.report) - share_;
@@ -59,29 +67,38 @@ PredictionCheck::Error PredictionCheck::error_between(const State& predicted, co
   return {change.head<3>().norm(), change.tail<3>().norm()};
 }
 
-void PredictionCheck::begin(const Error& off) {
+void PredictionCheck::begin(Time t, const Error& off) {
+  if (!error_) {
+    recurred_ = recurs();
+    since_ = t;
+    unusual_share_ = 0;
+  }
   const Error before = error_.value_or(Error{});
   error_ = {std::max(before.turned, off.turned), std::max(before.moved, off.moved)};
-  sweeps_with_error_ = 0;
+  sweeps_with_error_ = agreeing_sweeps_ = 0;
   begun_ += 1;
   if (gives_up()) error_.reset();
 }
 
-void PredictionCheck::learn(const State& predicted, const Registration& sweep) {
-  constexpr int remembered_errors = 5;  // sweeps
-  constexpr double as_usual = 2;
-  if (error_) ++sweeps_with_error_;
-  if (sweep.searched || !sweep.carries || met(sweep.report) == 0) return;
+void PredictionCheck::learn(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
+  if (!measures(sweep)) return;
+  contradicted_sweeps_ = contradicts(sweep) ? contradicted_sweeps_ + 1 : 0;
+  if (error_) {
+    ++sweeps_with_error_;
+    lasted_ = sweep.posterior.t - since_;
+    const Error off = error_between(prior.x, sweep.posterior.x);
+    const auto follow = [](double& rms, double now) { rms = std::sqrt(rms * rms + (now * now - rms * rms) / enough); };
+    follow(error_->turned, off.turned);
+    follow(error_->moved, off.moved);
+    const bool out = is_unusual(LidarPipeline::squared_change(prior, sweep, map_error));
+    unusual_share_ += ((out ? 1 : 0) - unusual_share_) / remembered;
+    agreeing_sweeps_ = out ? 0 : agreeing_sweeps_ + 1;
+    if (agreeing_sweeps_ >= (recurred_ ? remembered : enough)) error_.reset();
+  }
+  if (sweep.searched) return;
   sweeps_ = std::min(sweeps_ + 1, remembered);
-  const double weight = 1.0 / sweeps_;
   if (!gives_up()) begun_ -= begun_ / remembered;
-  share_ += weight * (share_beside(sweep.report) - share_);
-  const Error change = error_between(predicted, sweep.posterior.x);
-  if (!error_) return average(usual_, change, weight);
-  average(*error_, change, 1.0 / remembered_errors);
-  if (error_->turned > as_usual * usual_.turned || error_->moved > as_usual * usual_.moved) return;
-  error_.reset();
-  sweeps_with_error_ = 0;
+  share_ += (share_beside(sweep.report) - share_) / sweeps_;
 }
 
 }  // namespace kilvo

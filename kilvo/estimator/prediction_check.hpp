@@ -4,6 +4,8 @@
 // prediction was wrong. In a crowd no pose does.
 #pragma once
 
+#include <bit>
+
 #include "kilvo/lidar/lidar_pipeline.hpp"
 
 namespace kilvo {
@@ -11,13 +13,19 @@ namespace kilvo {
 class PredictionCheck {
  public:
   /// It was registered much farther from `prior` than the covariance says and than sweeps usually are: the first one of its kind after some
-  /// that were not, as after a push, or the next, which is none. `map_error`: of the map around the prior. To be asked once a sweep.
+  /// that were not, as after a push, or one more, which is none. `map_error`: of the map around the prior. To be asked once a sweep;
+  /// one that `rejoins` the map may be anywhere.
   enum class Surprise : std::uint8_t { none, first, again };
-  Surprise surprise(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
+  Surprise surprise(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error, bool rejoins);
   /// Of what meets a surface a tenth more than usual lies beside it.
   bool contradicts(const Registration& sweep) const;
+  /// No pose near by explains it, and one farther away may: the sweeps before may have been smeared. In a crowd there is none, and the more
+  /// sweeps were not explained, the less often a search is worth its time.
+  bool is_to_be_searched_for() const { return std::has_single_bit(contradicted_sweeps_ + 1); }
   /// The prior from which the sweep is to be registered again: uncertain as far as the nearest planes are the right ones.
   static Estimate released(const Estimate& prior);
+  /// Uncertain beyond that: the sweep is searched for.
+  static Estimate lost(const Estimate& prior);
   /// `again`, the same sweep from another prior, lies on the surfaces as sweeps usually do.
   bool explains(const Registration& again, const Registration& sweep) const;
 
@@ -26,34 +34,44 @@ class PredictionCheck {
     double turned = 0, moved = 0;
   };
   static Error error_between(const State& predicted, const State& found);
-  /// The prediction was off by this: those that follow may be as well.
-  void begin(const Error& off);
+  /// The prediction at `t` was off by this: those that follow may be as well.
+  void begin(Time t, const Error& off);
   /// Of the predictions now, as the last sweeps show it; none while they are right.
   const std::optional<Error>& error() const { return error_; }
-  /// That has lasted for some sweeps: a shock has passed by then, a bias has not. Once, and again when predictions contradict the sweeps.
-  bool lasts() const { return error_ && sweeps_with_error_ == lasting; }
+  /// That has lasted for some sweeps: a shock has passed by then, a bias has not. True for one of them.
+  bool lasts() const { return error_ && sweeps_with_error_ == enough; }
+  /// It had ended, a moment ago: no shock either.
+  bool recurs() const { return !error_ && begun_ > 0.5; }
 
   /// Too often contradicted to be the IMU's: nothing is doubted any more.
   bool gives_up() const { return begun_ >= too_often; }
-  /// That, or contradicted for `remembered` sweeps that the estimate is not to be used.
-  bool is_hopeless() const { return gives_up() || sweeps_with_error_ > remembered; }
+  /// That, or for seconds every other sweep was not where it was predicted.
+  bool is_hopeless() const { return gives_up() || (error_ && unusual_share_ > 0.5 && lasted_ > std::chrono::seconds(5)); }
 
-  /// A sweep was registered from `predicted`, as far as the filter knew before error() was added.
-  void learn(const State& predicted, const Registration& sweep);
+  /// A sweep was registered; `prior`: as far as the filter knew before error() was added.
+  void learn(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
 
  private:
-  static constexpr int lasting = 5, remembered = 50;  // sweeps
-  static constexpr double too_often = 5;  // contradictions within `remembered` sweeps: no IMU changes so often, the description is wrong
+  static constexpr int enough = 5, remembered = 50;  // sweeps
+  static constexpr double too_often = 5;             // contradictions of late, about one in ten sweeps: no IMU changes so often
 
-  int sweeps_ = 0;    // that were learnt from, at most `remembered`
-  double share_ = 0;  // of what met a surface: beside it
-  Error usual_;       // root mean square changes by sweeps
+  bool is_unusual(double change) const;
+
+  int sweeps_ = 0;                    // that were learnt from, at most `remembered`
+  double share_ = 0;                  // of what met a surface: beside it
+  unsigned contradicted_sweeps_ = 0;  // in a row, whatever was tried
   std::optional<Error> error_;
   double begun_ = 0;           // how often of late predictions contradicted the sweeps
+  Time since_{};               // there is an error
+  Duration lasted_{};          // until the last sweep that measured anything
+  bool recurred_ = false;      // soon after it had ended
   int sweeps_with_error_ = 0;  // since predictions contradicted the sweeps the last time
+  double unusual_share_ = 0;   // of late, of sweeps that were not where they usually are
+  int agreeing_sweeps_ = 0;    // in a row, that were
   double usual_change_ = 0;    // mean of squared changes by sweeps, per covariance of the prior
-  int expected_sweeps_ = 0;    // in a row, that were where they usually are
-  bool surprised_ = false;     // by the last sweep
+  int expected_sweeps_ = 0;    // in a row, that were where they usually are, without error()
+  int unexpected_sweeps_ = 0;  // in a row, that were not
+  bool surprised_ = false;     // by the last sweep, the first one
 };
 
 }  // namespace kilvo

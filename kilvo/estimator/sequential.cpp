@@ -70,6 +70,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
     }
     return history_.advance_to(end);
   }
+  if (sweep.searched) lidar_.rejoin();
   if (config_.lidar.least_ratio > 0 && eigenvalue_ratio(sweep.points) < config_.lidar.least_ratio)
     return findings_.drop(Sensor::lidar, Reason::agrees_with_nothing);
   history_.resume(sweep.posterior);

@@ -45,51 +45,72 @@ Registration WorldMap::measure(LidarPipeline& lidar, const Sweep& sweep, const H
   return out;
 }
 
-// Where the prior is uncertain for what the accelerometer reported alone, the sweep fits where nothing has pushed the robot.
+WorldMap::Attempt WorldMap::attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops& drops) const {
+  const Estimate prior = history.at(middle);
+  history.record_from(prior, sweep.end);
+  Registration found = measure(lidar, sweep, history, prior, drops);
+  return {std::move(history), prior, std::move(found)};
+}
+
+Registration WorldMap::measure_near(LidarPipeline& lidar, const Sweep& sweep, const History& history, Estimate prior,
+                                    const Estimate& released) const {
+  PointDrops counted;
+  prior.x = measure(lidar, sweep, history, released, counted).posterior.x;
+  return measure(lidar, sweep, history, prior, counted);
+}
+
 Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, History& history, Estimate& prior, PointDrops& drops) {
-  const auto go_on_with = [&](History&& other) {
-    history = std::move(other);
-    prior = history.at(prior.t);
-    history.record_from(prior, sweep.end);
+  const Estimate predicted = prior;
+  Registration out;
+  const auto go_on_with = [&](Attempt&& other) {
+    history = std::move(other.history);
+    prior = other.prior;
+    out = std::move(other.sweep);
   };
-  const State predicted = prior.x;
-  if (const auto& e = prediction_.error()) {
-    if (auto looser = history.loosened(prior.t, e->turned, e->moved, prediction_.lasts())) go_on_with(std::move(*looser));
+  const auto& doubt = prediction_.error();
+  if (auto doubted = doubt ? history.loosened(prior.t, doubt->turned, doubt->moved, prediction_.lasts()) : std::nullopt) {
+    Attempt other = attempt(lidar, sweep, std::move(*doubted), prior.t, drops);
+    if (other.sweep.carries) {
+      go_on_with(std::move(other));
+    } else {  // it leaves no doubt behind: the next sweep comes from the same base
+      out = std::move(other.sweep);
+      out.posterior = prior;
+    }
+  } else {
+    out = measure(lidar, sweep, history, prior, drops);
   }
-  Registration out = measure(lidar, sweep, history, prior, drops);
-  PointDrops counted;  // before
   const auto try_again_with = [&](std::optional<History> other, const auto& is_right) {
     if (!other) return false;
-    const Estimate expected = other->at(prior.t);
-    other->record_from(expected, sweep.end);
-    Registration again = measure(lidar, sweep, *other, expected, counted);
-    if (again.refused || !again.carries || !is_right(expected, again)) return false;
-    history = std::move(*other);
-    prior = expected;
-    out = std::move(again);
+    PointDrops counted;
+    Attempt again = attempt(lidar, sweep, std::move(*other), prior.t, counted);
+    if (again.sweep.refused || !again.sweep.carries || !is_right(again.prior, again.sweep)) return false;
+    go_on_with(std::move(again));
     return true;
   };
-  const auto explains = [&](const Estimate&, const Registration& again) { return prediction_.explains(again, out); };
   const auto agrees = [&](const Estimate& expected, const Registration& again) {
     return LidarPipeline::squared_change(expected, again, error_at(expected.x.pose())) < LidarPipeline::agreeing_change;
   };
-  const auto surprise = lidar.is_rejoining() ? PredictionCheck::Surprise::none : prediction_.surprise(prior, out, error_at(prior.x.pose()));
+  const auto surprise = prediction_.surprise(prior, out, error_at(prior.x.pose()), lidar.is_rejoining());
   const bool is_contradicted = prediction_.contradicts(out);
   if (is_contradicted || surprise == PredictionCheck::Surprise::again) {
-    // With the gate of the prior again: an uncertain one lets almost everything lie on the surfaces.
-    Estimate there = prior;
-    there.x = measure(lidar, sweep, history, PredictionCheck::released(prior), counted).posterior.x;
-    const Registration near = measure(lidar, sweep, history, there, counted);
+    const auto explains = [&](const Registration& again) {
+      return is_contradicted ? prediction_.explains(again, out) : again.carries && !again.refused;
+    };
+    Registration near = measure_near(lidar, sweep, history, prior, PredictionCheck::released(prior));
+    if (is_contradicted && !explains(near) && prediction_.is_to_be_searched_for())
+      near = measure_near(lidar, sweep, history, prior, PredictionCheck::lost(prior));
     const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
-    const bool is_right = is_contradicted ? prediction_.explains(near, out) : near.carries && !near.refused;
-    auto looser = is_right ? history.loosened(prior.t, off.turned, off.moved, false) : std::nullopt;
-    if (is_contradicted ? try_again_with(std::move(looser), explains) : try_again_with(std::move(looser), agrees)) prediction_.begin(off);
+    const auto is_right = [&](const Estimate& expected, const Registration& again) {
+      return is_contradicted ? explains(again) : agrees(expected, again);
+    };
+    if (explains(near) && try_again_with(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs()), is_right))
+      prediction_.begin(prior.t, off);
   } else if (surprise == PredictionCheck::Surprise::first) {
     try_again_with(history.loosened(prior.t, 0, (out.posterior.x.p - prior.x.p).norm(), false), agrees);
   } else if (out.searched && out.refused == Reason::fits_nowhere) {
     try_again_with(history.doubted(sweep.end), [](const auto&...) { return true; });
   }
-  prediction_.learn(predicted, out);
+  prediction_.learn(predicted, out, error_at(predicted.x.pose()));
   return out;
 }
 

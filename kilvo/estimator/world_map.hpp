@@ -30,8 +30,8 @@ class WorldMap {
     bool without_legs = false;                           // see LidarPipeline::Context
     PoseCovariance considered = PoseCovariance::Zero();  // see Registration
   };
-  /// Registers a sweep from `prior`, of its middle. Where it is not for what the IMU reported, that is doubted: then `history` and `prior`
-  /// become what they are without. `drops` counts.
+  /// Registers a sweep from `prior`, of its middle. Where it is not for what the IMU reported, that is doubted, see PredictionCheck: then
+  /// `history` and `prior` become what they are without. `drops` counts.
   Registration register_sweep(LidarPipeline& lidar, const Sweep& sweep, History& history, Estimate& prior, PointDrops& drops);
   /// Whether the IMU predicts what sweeps find.
   const PredictionCheck& prediction() const { return prediction_; }
@@ -52,7 +52,19 @@ class WorldMap {
   void begin_anew(const Estimate& e);
 
  private:
+  struct Attempt {
+    History history;
+    Estimate prior;
+    Registration sweep;
+  };
+
   Registration measure(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior, PointDrops& drops) const;
+  /// As another history predicts it.
+  Attempt attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops& drops) const;
+  /// From where it is found from `released`, with the gate of the prior: that of an uncertain one lets almost everything lie on the
+  /// surfaces.
+  Registration measure_near(LidarPipeline& lidar, const Sweep& sweep, const History& history, Estimate prior,
+                            const Estimate& released) const;
 
   MapConfig config_;
   LidarConfig lidar_;

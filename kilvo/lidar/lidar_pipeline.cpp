@@ -135,13 +135,12 @@ void LidarPipeline::track(const Estimate& prior, LidarModel& model, const Undist
 }
 
 void LidarPipeline::search(const VoxelMap& map, const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan,
-                           Registration& out) {
+                           Registration& out) const {
   const auto found = find_pose(map, out.clusters, mount_.T_imu_lidar.p, prior, config_, workers_);
   if (!found) {
     out.refused = Reason::fits_nowhere;
     return;
   }
-  rejoin();
   constexpr double found_rotation = 0.006, found_position = 0.005;  // rad, m
   PoseCovariance guessed = within_scan.V + noise_of_velocity(prior.P, mount_.rate);
   guessed.diagonal().head<3>().array() += found_rotation * found_rotation;

@@ -107,7 +107,7 @@ class LidarPipeline {
   static constexpr int consistent_sweeps = 3;
 
   void track(const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out) const;
-  void search(const VoxelMap& map, const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out);
+  void search(const VoxelMap& map, const Estimate& prior, LidarModel& model, const UndistortionNoise& within_scan, Registration& out) const;
 
   LidarMount mount_;
   LidarConfig config_;

@@ -299,18 +299,20 @@ TEST_F(Senses, AnImuThatMeasuresOtherwiseFromNowOnIsFoundByTheSweeps) {
   struct Fault {
     const char* name;
     std::function<void(ImuSample&)> of;
+    double until = 100;  // s
   };
   const std::array faults = {Fault{"bias of the gyro, about the vertical", [](ImuSample& s) { s.gyro.z() += 0.1; }},
                              Fault{"bias of the gyro, about the walk", [](ImuSample& s) { s.gyro.x() += 0.3; }},
                              Fault{"bias of the accelerometer, level", [](ImuSample& s) { s.accel.x() += 0.5; }},
                              Fault{"bias of the accelerometer, upwards", [](ImuSample& s) { s.accel.z() += 2; }},
+                             Fault{"turns for 0.3 s that nothing makes", [](ImuSample& s) { s.gyro.z() += 0.8; }, 8.3},
                              Fault{"scale of the gyro", [](ImuSample& s) { s.gyro *= 1.1; }},
                              Fault{"clock", [](ImuSample& s) { s.t += std::chrono::milliseconds(40); }}};
   for (const Fault& fault : faults) {
     for (const auto& used : {kil, li}) {
       SCOPED_TRACE(testing::Message() << fault.name << ", legs " << used[1]);
       const auto changed = [&fault](Measurement& m, double s) {
-        if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && s >= 8) fault.of(*imu);
+        if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && s >= 8 && s < fault.until) fault.of(*imu);
         return true;
       };
       // The stamps of the outputs are the IMU's, but where the legs find a step of its clock.
@@ -320,6 +322,10 @@ TEST_F(Senses, AnImuThatMeasuresOtherwiseFromNowOnIsFoundByTheSweeps) {
       std::printf("%s, legs %d: worst %.1f mm, at the end %.1f mm; %.1f sigmas\n", fault.name, used[1],
                   1e3 * o.worst(&Moment::error, 0, 14), 1e3 * o.worst(&Moment::error, 13, 14), o.worst(&Moment::sigmas, 9, 14));
       EXPECT_LT(o.worst(&Moment::error, 0, 14), 0.1);
+      EXPECT_THAT(warnings_of(o.statistics), testing::Not(testing::IsEmpty()));
+      if (fault.until < 14) {
+        EXPECT_FALSE(o.statistics.diverged) << "it is right again";
+      }
       EXPECT_LT(o.worst(&Moment::error, 13, 14), 0.03);
     }
   }
