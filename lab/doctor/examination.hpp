@@ -140,7 +140,7 @@ class Examination {
   bool try_acceleration_hypotheses();
   void examine_leg_size();
   bool accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const;
-  void examine_leg_shape();
+  bool examine_leg_shape();
   void examine_joint_speeds();
   // leg_mount.cpp, leg_zeros.cpp
   MountFit measure_leg_mount() const;

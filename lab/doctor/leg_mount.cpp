@@ -62,7 +62,7 @@ bool Examination::accelerates_as_it_turns(const MountFit& by_turning, const SO3&
   return by_turning.fit.good && (by_acceleration * by_turning.R.inverse()).Log().norm() < 0.5 * angle;
 }
 
-void Examination::examine_leg_shape() {
+bool Examination::examine_leg_shape() {
   const double angle = leg_acceleration_.turn.norm();
   // Soles that creep by a centimetre in a stance turn it by 4 to 6 degrees.
   constexpr double creeping = 0.035;  // rad
@@ -70,7 +70,7 @@ void Examination::examine_leg_shape() {
     check(Sensor::legs, "mount of the IMU, lengths", Check::Verdict::unknown,
           fmt::format("by their acceleration the legs are turned by {:.1f} degrees, standard deviation {:.1f}, and not by their turning",
                       degrees(angle), degrees(sigma)));
-    return;
+    return false;
   }
   Finding f{Sensor::legs, "leg_lengths", {}, {}, {}, std::sin(angle), {}, {}, true};
   f.text =
@@ -80,6 +80,7 @@ void Examination::examine_leg_shape() {
                            100 * leg_acceleration_.explained);
   f.remedy = "robot.urdf: the lengths of thigh and shin, or the URDF of this robot";
   find(std::move(f));
+  return true;
 }
 
 void Examination::examine_leg_rotation() {
@@ -118,7 +119,8 @@ void Examination::examine_leg_rotation() {
     method = stance_method;
     clock_method = stance_clock_method;
   } else if (accelerates && !accelerates_as_it_turns(fit, start.imu.T_link_imu.R)) {
-    examine_leg_shape();
+    // Their turning shows a clock that is far off all the same.
+    if (!examine_leg_shape() && fit.fit.good) examine_leg_clock(fit, clock_method, alone_leg_clock_tolerance);
     return;
   } else if (accelerates) {
     adopt(start.imu.T_link_imu.R.inverse() * SO3::Exp(leg_acceleration_.turn), leg_acceleration_.sigma, leg_acceleration_.offset,

@@ -96,14 +96,19 @@ Recorded Recorder::finish() {
   for (std::size_t s = 0; s < sensor_count; ++s) {
     std::vector<double>& t = times_[s];
     std::ranges::sort(t);
-    std::vector<double> steps;
-    for (std::size_t i = 1; i < t.size(); ++i) steps.push_back(t[i] - t[i - 1]);
+    const auto median_step = [&t](std::size_t apart) {
+      std::vector<double> steps;
+      for (std::size_t i = apart; i < t.size(); ++i) steps.push_back((t[i] - t[i - apart]) / static_cast<double>(apart));
+      const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+      std::ranges::nth_element(steps, middle);
+      return *middle;
+    };
     recorded_.stamps[s].count = t.size();
-    if (steps.empty()) continue;
-    // With whole seconds between the ends, a median would be fooled by stamps that come in bursts.
-    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::ranges::nth_element(steps, middle);
-    recorded_.stamps[s].period = *middle;
+    if (t.size() < 2) continue;
+    // With whole seconds between the ends, a median would be fooled by stamps that come in bursts; without, by messages that are missing.
+    constexpr double in_bursts = 3;
+    const double single = median_step(1), several = median_step(std::min<std::size_t>(50, t.size() / 2));
+    recorded_.stamps[s].period = several > in_bursts * single ? several : single;
   }
   return std::move(recorded_);
 }
