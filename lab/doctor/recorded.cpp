@@ -107,7 +107,7 @@ Recorded Recorder::finish() {
     if (t.size() < 2) continue;
     // With whole seconds between the ends, a median would be fooled by stamps that come in bursts; without, by messages that are missing.
     constexpr double in_bursts = 3;
-    const double single = median_step(1), several = median_step(std::min<std::size_t>(50, t.size() / 2));
+    const double single = median_step(1), several = median_step(std::min<std::size_t>(200, t.size() / 2));
     recorded_.stamps[s].period = several > in_bursts * single ? several : single;
   }
   return std::move(recorded_);
