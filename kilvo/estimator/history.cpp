@@ -49,9 +49,9 @@ std::optional<History> History::doubted(Time end) const {
 std::optional<History> History::loosened(Time middle, double turned, double moved, bool biases) const {
   // It may have begun before the base, if that is an image: since the last sweep.
   const double before = swept_ ? std::max(0.0, to_seconds(base_.t - *swept_)) : 0;
-  constexpr double shortest = 0.02, longest = 1.5, noticed = 0.1;  // s; between sweeps, and how soon a bias is found
-  const double since = before + to_seconds(middle - base_.t);
-  if (since < shortest || since > longest) return std::nullopt;
+  constexpr double shortest = 0.01, longest = 1.5, noticed = 0.1;  // s; between sweeps, and how soon a bias is found
+  const double told = before + to_seconds(middle - base_.t), since = std::max(told, shortest);
+  if (!(told > 0) || told > longest) return std::nullopt;
   std::optional<History> out(*this);
   Covariance& P = out->base_.P;
   const double velocity = moved / since;

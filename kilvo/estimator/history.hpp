@@ -36,8 +36,8 @@ class History {
   /// closed() stay.
   std::optional<History> doubted(Time end) const;
   /// A history in which the pose that is predicted from the last sweep to `middle` may be off by so much, rad and m, and the rates since
-  /// then with it; if `biases` are doubted, those of the IMU may have become others. None when that sweep is more than 1.5 s or less than
-  /// 20 ms ago. now() and closed() stay.
+  /// then with it; if `biases` are doubted, those of the IMU may have become others. None when that sweep is more than 1.5 s ago. now() and
+  /// closed() stay.
   std::optional<History> loosened(Time middle, double turned, double moved, bool biases) const;
   /// The estimate at `until` if it was `e` before. The poses in between are in the trajectory.
   Estimate record_from(const Estimate& e, Time until);

@@ -163,6 +163,7 @@ TEST(History, APredictionThatIsDoubtedMayHaveBeenOffSinceTheSweepBeforeNotSinceT
   EXPECT_EQ(sigma(more(false), at::ba), 0);
   EXPECT_TRUE(history.loosened(middle + milliseconds(1399), turned, moved, true)) << "sweeps may come once a second";
   EXPECT_FALSE(history.loosened(middle + milliseconds(1401), turned, moved, true)) << "more than 1.5 s after the sweep before";
+  EXPECT_TRUE(history.loosened(middle - milliseconds(9), turned, moved, true)) << "or fifty times, with stamps that jitter";
 }
 
 TEST(History, BeforeAnySweepIsUsedAPredictionIsDoubtedSinceTheBase) {

@@ -71,10 +71,13 @@ void PredictionCheck::begin(Time t, const Error& off) {
   if (!error_) {
     recurred_ = recurs();
     since_ = t;
-    unusual_share_ = 0;
+    doubted_sweeps_ = 0;
   }
+  // What has grown over some sweeps is not the error of the next one, and no search goes farther.
+  constexpr double most = 2;  // of what the nearest planes bear
   const Error before = error_.value_or(Error{});
-  error_ = {std::max(before.turned, off.turned), std::max(before.moved, off.moved)};
+  error_ = {std::max(before.turned, std::min(off.turned, most * well_known_rotation)),
+            std::max(before.moved, std::min(off.moved, most * well_known_position))};
   sweeps_with_error_ = agreeing_sweeps_ = 0;
   begun_ += 1;
   if (gives_up()) error_.reset();
@@ -87,12 +90,20 @@ void PredictionCheck::learn(const Estimate& prior, const Registration& sweep, co
     ++sweeps_with_error_;
     lasted_ = sweep.posterior.t - since_;
     const Error off = error_between(prior.x, sweep.posterior.x);
-    const auto follow = [](double& rms, double now) { rms = std::sqrt(rms * rms + (now * now - rms * rms) / enough); };
+    // A search may have found another place: then predictions were not off by more.
+    const auto follow = [&sweep](double& rms, double now) {
+      if (sweep.searched) now = std::min(now, rms);
+      rms = std::sqrt(rms * rms + (now * now - rms * rms) / enough);
+    };
     follow(error_->turned, off.turned);
     follow(error_->moved, off.moved);
     const bool out = is_unusual(LidarPipeline::squared_change(prior, sweep, map_error));
-    unusual_share_ += ((out ? 1 : 0) - unusual_share_) / remembered;
-    agreeing_sweeps_ = out ? 0 : agreeing_sweeps_ + 1;
+    doubted_sweeps_ = std::min(doubted_sweeps_ + 1, remembered);
+    unusual_share_ += ((out ? 1 : 0) - unusual_share_) / doubted_sweeps_;
+    // A prior that is uncertain for the doubt before agrees with anything.
+    constexpr double near = 0.3;  // of what the nearest planes bear
+    const bool is_near = off.turned < near * well_known_rotation && off.moved < near * well_known_position;
+    agreeing_sweeps_ = out || !is_near ? 0 : agreeing_sweeps_ + 1;
     if (agreeing_sweeps_ >= (recurred_ ? remembered : enough)) error_.reset();
   }
   if (sweep.searched) return;

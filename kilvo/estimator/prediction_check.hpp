@@ -66,7 +66,8 @@ class PredictionCheck {
   Duration lasted_{};          // until the last sweep that measured anything
   bool recurred_ = false;      // soon after it had ended
   int sweeps_with_error_ = 0;  // since predictions contradicted the sweeps the last time
-  double unusual_share_ = 0;   // of late, of sweeps that were not where they usually are
+  int doubted_sweeps_ = 0;     // since there is an error, at most `remembered`
+  double unusual_share_ = 0;   // of those: not where they usually are
   int agreeing_sweeps_ = 0;    // in a row, that were
   double usual_change_ = 0;    // mean of squared changes by sweeps, per covariance of the prior
   int expected_sweeps_ = 0;    // in a row, that were where they usually are, without error()

@@ -105,6 +105,33 @@ TEST(PredictionCheck, PredictionsAreDoubtedUntilSomeSweepsAreWhereTheyWere) {
   EXPECT_FALSE(c.check.lasts());
 }
 
+// The doubt before leaves the prior uncertain: it agrees with anything, and predictions may be off all the same.
+TEST(PredictionCheck, OnlySweepsNearThePredictionAgreeWithIt) {
+  Checked c = after(30, 100);
+  c.check.begin(c.t, {0.02, 0.05});
+  Estimate uncertain;
+  uncertain.P.diagonal().head<6>().setConstant(0.1 * 0.1);
+  const auto see = [&](double moved, bool searched) {
+    Registration found = sweep(100, moved);
+    found.searched = searched;
+    c.check.learn(uncertain, found, exact_map);
+  };
+  for (int k = 0; k < 20; ++k) see(0.04, false);
+  EXPECT_TRUE(c.check.error());
+  const double before = c.check.error()->moved;
+  see(0.3, true);
+  EXPECT_LE(c.check.error()->moved, before) << "a search may have found another place";
+  for (int k = 0; k < 5; ++k) see(0.01, true);
+  EXPECT_FALSE(c.check.error());
+}
+
+TEST(PredictionCheck, WhatHasGrownOverSweepsIsNotTheErrorOfTheNext) {
+  Checked c = after(30, 100);
+  c.check.begin(c.t, {0.5, 0.3});
+  EXPECT_NEAR(c.check.error()->turned, 0.06, 1e-9);
+  EXPECT_NEAR(c.check.error()->moved, 0.16, 1e-9);
+}
+
 TEST(PredictionCheck, AnErrorThatComesAgainIsDoubtedForLonger) {
   Checked c = after(30, 100);
   EXPECT_FALSE(c.check.recurs());

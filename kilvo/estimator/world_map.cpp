@@ -69,16 +69,14 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, 
   };
   const auto& doubt = prediction_.error();
   if (auto doubted = doubt ? history.loosened(prior.t, doubt->turned, doubt->moved, prediction_.lasts()) : std::nullopt) {
-    Attempt other = attempt(lidar, sweep, std::move(*doubted), prior.t, drops);
-    if (other.sweep.carries) {
+    PointDrops counted = drops;
+    if (Attempt other = attempt(lidar, sweep, std::move(*doubted), prior.t, counted); other.sweep.carries) {
       go_on_with(std::move(other));
-    } else {  // it leaves no doubt behind: the next sweep comes from the same base
-      out = std::move(other.sweep);
-      out.posterior = prior;
+      drops = counted;
     }
-  } else {
-    out = measure(lidar, sweep, history, prior, drops);
   }
+  // A doubt of a prior from which the sweep fits nowhere leaves no trace.
+  if (!out.carries) out = measure(lidar, sweep, history, prior, drops);
   const auto try_again_with = [&](std::optional<History> other, const auto& is_right) {
     if (!other) return false;
     PointDrops counted;
