@@ -64,9 +64,14 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
   interval.more_accel = gap > blind_gap ? 0 : accel2 * gap;  // more is added after the prediction (inflate_covariance_over_gap)
   constexpr double told_by_its_ends = 0.25;                  // s
   if (gap > told_by_its_ends) {
-    // The two samples do not determine the motion between them.
+    // The two samples do not determine the motion between them. The robot leans no farther, and keeps turning for a while: as it did on the
+    // whole, and as it does at either end.
+    constexpr double keeps_turning = 2, at_an_end = 0.3;  // s, share
+    const double kept = keeps_turning / gap * (1 - std::exp(-gap / keeps_turning));
+    const Eigen::Vector3d up_I = x.R.inverse() * -x.g.normalized();
+    const Eigen::Vector3d rate = (1 - 2 * at_an_end) * usual_.gyro_mean + at_an_end * (a.gyro + b.gyro) - x.bg;
     interval.more_gyro = 0;
-    interval.gyro_begin = interval.gyro_end = x.bg;
+    interval.gyro_begin = interval.gyro_end = x.bg + kept * rate.dot(up_I) * up_I;
     interval.accel_begin = interval.accel_end = x.ba - x.R.inverse() * x.g;
   }
   return interval;

@@ -304,6 +304,34 @@ TEST(Replay, AcrossAGapOfTheImuTheCovarianceSaysThatNobodyLooked) {
   EXPECT_GT(after_gap(milliseconds(500)), after_gap(milliseconds(120)));
 }
 
+TEST(Replay, ARobotThatTurnsGoesOnTurningAcrossAGapOfTheImuAndLeansNoFarther) {
+  constexpr double rate = 0.8;  // rad/s
+  const auto turned_over = [](Duration gap, double after) {
+    Replay replay{EstimatorConfig{}};
+    const auto sample = [](Duration t, double turning) {
+      const double s = to_seconds(t);
+      return ImuSample{begin_time + t, {0.5 * std::sin(12 * s), 0.5 * std::cos(12 * s), turning}, {0, 0, standard_gravity}};
+    };
+    for (Duration t{}; t <= std::chrono::seconds(4); t += milliseconds(5)) replay.add(sample(t, rate));
+    const Time begin = begin_time + std::chrono::seconds(4);
+    replay.add(sample(begin + gap - begin_time, after));
+    Estimate e = start();
+    e.t = begin;
+    e.x.R = {};
+    Trajectory record(std::chrono::seconds(2));
+    replay.advance(e, begin + gap, &record);
+    return Eigen::Vector3d(e.x.R.Log());
+  };
+  for (const int ms : {300, 600}) {
+    const Eigen::Vector3d turned = turned_over(milliseconds(ms), rate);
+    EXPECT_NEAR(turned.z(), rate * 1e-3 * ms, 0.15 * rate * 1e-3 * ms) << ms;
+    EXPECT_LT(turned.head<2>().norm(), 0.01) << ms;
+  }
+  const double stopped = turned_over(milliseconds(600), 0).z();
+  EXPECT_GT(stopped, 0.2 * rate * 0.6);
+  EXPECT_LT(stopped, 0.8 * rate * 0.6) << "it turns no more";
+}
+
 // A sweep whose points were taken along while the IMU was silent is as uncertain as the prediction over that time.
 TEST(Replay, WithinAGapTheNoiseIsThatOfThePredictionOverIt) {
   Replay replay{EstimatorConfig{}};
