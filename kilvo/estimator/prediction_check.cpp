@@ -38,18 +38,18 @@ bool PredictionCheck::is_unusual(double change) const {
 
 PredictionCheck::Surprise PredictionCheck::surprise(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error,
                                                     bool rejoins) {
-  const int expected = std::exchange(expected_sweeps_, 0), unexpected = std::exchange(unexpected_sweeps_, 0);
+  const int before = std::exchange(in_a_row_, 0);
   const bool was_surprised = std::exchange(surprised_, false);
   if (error_ || rejoins || !measures(sweep) || sweep.searched) return Surprise::none;
   const double change = LidarPipeline::squared_change(prior, sweep, map_error);
   const bool out = is_unusual(change);
   usual_change_ += (std::min(change, LidarPipeline::agreeing_change) - usual_change_) / remembered;
-  if (!out) expected_sweeps_ = expected + 1;
+  if (!out) in_a_row_ = std::max(before, 0) + 1;
   if (!out || gives_up()) return Surprise::none;
-  unexpected_sweeps_ = unexpected + 1;
+  in_a_row_ = std::min(before, 0) - 1;
   constexpr int too_many = 3;  // sweeps
-  if (unexpected_sweeps_ >= too_many || was_surprised) return Surprise::again;
-  surprised_ = expected >= enough;
+  if (in_a_row_ <= -too_many || was_surprised) return Surprise::again;
+  surprised_ = before >= enough;
   return surprised_ ? Surprise::first : Surprise::none;
 }
 

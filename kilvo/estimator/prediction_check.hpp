@@ -70,8 +70,7 @@ class PredictionCheck {
   double unusual_share_ = 0;   // of those: not where they usually are
   int agreeing_sweeps_ = 0;    // in a row, that were
   double usual_change_ = 0;    // mean of squared changes by sweeps, per covariance of the prior
-  int expected_sweeps_ = 0;    // in a row, that were where they usually are, without error()
-  int unexpected_sweeps_ = 0;  // in a row, that were not
+  int in_a_row_ = 0;           // sweeps without error() that were where they usually are; negative: that were not
   bool surprised_ = false;     // by the last sweep, the first one
 };
 
