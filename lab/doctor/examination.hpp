@@ -104,7 +104,7 @@ class Examination {
   void examine_lidar_position();
   void examine_lidar_range();
   bool lidar_scale_contradicts() const;
-  bool is_lidar_scale_that_of_slow_motion(const SO3& R_IL);
+  bool settle_lidar_scale_by_slow_motion(const SO3& R_IL);
   bool examine_lidar_scale();
   void accuse_lidar_scale(double factor, const std::string& evidence);
   // leg_examination.cpp

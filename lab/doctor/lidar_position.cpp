@@ -30,7 +30,7 @@ void Examination::examine_lidar_position() {
     return;
   }
   lidar_scale_ = rows.scale(accel_axes_, *translation_);
-  if (lidar_scale_contradicts() && !is_lidar_scale_that_of_slow_motion(R_IL)) return;
+  if (lidar_scale_contradicts() && !settle_lidar_scale_by_slow_motion(R_IL)) return;
   if (examine_lidar_scale()) return;
   const TranslationFit& fit = *translation_;
   const Eigen::Vector3d described = robot_.lidar.T_imu_lidar.p, error = fit.r - described;
@@ -85,9 +85,10 @@ bool Examination::lidar_scale_contradicts() const {
 }
 
 // Points of another unit are as wrong for slow motion as for fast one, and it knows their scale better. An accelerometer that aliases or is
-// filtered explains neither, and is no witness.
-bool Examination::is_lidar_scale_that_of_slow_motion(const SO3& R_IL) {
-  constexpr double apart = 0.25, known = 0.06;  // s, -: true scales of 0.3 to 1.5 were known to 0.05, those of an aliasing IMU to 0.07 to 0.2
+// filtered explains neither, and is no witness: then false, and the scale is unknown.
+bool Examination::settle_lidar_scale_by_slow_motion(const SO3& R_IL) {
+  constexpr double apart = 0.25,
+                   known = 0.06;  // s, -: true scales of 0.3 to 1.5 were known to 0.05, those of an aliasing IMU to 0.07 to 0.2
   std::vector<SweepPose> slow;
   for (const SweepPose& pose : way_)
     if (slow.empty() || pose.t - slow.back().t > apart) slow.push_back(pose);
@@ -97,9 +98,10 @@ bool Examination::is_lidar_scale_that_of_slow_motion(const SO3& R_IL) {
   const double fast = std::exchange(lidar_scale_, rows.scale(accel_axes_, *fit)).factor;
   if (lidar_scale_.sigma < known * lidar_scale_.factor) return true;
   check(Sensor::lidar, "position of the mount", Check::Verdict::unknown,
-        fmt::format("way of the sweeps through that of the accelerometer: {:.2f}, of three sweeps together {:.2f}, standard deviation {:.2f}: "
-                    "the accelerometer aliases, is filtered, or its stamps are wrong",
-                    fast, lidar_scale_.factor, lidar_scale_.sigma));
+        fmt::format(
+            "way of the sweeps through that of the accelerometer: {:.2f}, of three sweeps together {:.2f}, standard deviation {:.2f}: "
+            "the accelerometer aliases, is filtered, or its stamps are wrong",
+            fast, lidar_scale_.factor, lidar_scale_.sigma));
   translation_.reset();
   lidar_scale_ = {};
   return false;

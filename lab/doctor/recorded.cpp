@@ -105,7 +105,7 @@ Recorded Recorder::finish() {
     };
     recorded_.stamps[s].count = t.size();
     if (t.size() < 2) continue;
-    // With whole seconds between the ends, a median would be fooled by stamps that come in bursts; without, by messages that are missing.
+    // Stamps in bursts make single steps too short, missing messages make long ones too long.
     constexpr double in_bursts = 3;
     const double single = median_step(1), several = median_step(std::min<std::size_t>(200, t.size() / 2));
     recorded_.stamps[s].period = several > in_bursts * single ? several : single;
