@@ -39,10 +39,20 @@ Estimate History::record_from(const Estimate& e, Time until) {
   return ahead;
 }
 
-std::optional<History> History::doubted(Time end) const {
-  if (end - base_.t > longest_correction) return std::nullopt;
+std::optional<History> History::doubted(Time end, bool gyro) const {
+  constexpr Duration longest = std::chrono::seconds(1);
+  if (end - base_.t > longest) return std::nullopt;
   std::optional<History> out(*this);
-  out->replay_.doubt_acceleration(base_);
+  out->replay_.doubt_samples(base_, gyro);
+  out->correct_trajectory(base_, Eigen::Vector3d::Zero());  // nothing after it
+  return out;
+}
+
+History History::moved(double turned, double moved) const {
+  History out(*this);
+  out.base_.P.diagonal().segment<3>(at::R).array() += turned * turned;
+  out.base_.P.diagonal().segment<3>(at::p).array() += moved * moved;
+  out.replay_.forget_estimates();
   return out;
 }
 

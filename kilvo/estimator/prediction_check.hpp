@@ -17,8 +17,10 @@ class PredictionCheck {
   /// one that `rejoins` the map may be anywhere.
   enum class Surprise : std::uint8_t { none, first, again };
   Surprise surprise(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error, bool rejoins);
-  /// Of what meets a surface a tenth more than usual lies beside it.
+  /// It fits nowhere, or of what meets a surface a tenth more than usual lies beside it.
   bool contradicts(const Registration& sweep) const;
+  /// The sweep before contradicted the prediction, whatever was tried.
+  bool was_contradicted() const { return contradicted_sweeps_ > 0; }
   /// No pose near by explains it, and one farther away may: the sweeps before may have been smeared. In a crowd there is none, and the more
   /// sweeps were not explained, the less often a search is worth its time.
   bool is_to_be_searched_for() const { return std::has_single_bit(contradicted_sweeps_ + 1); }
@@ -34,6 +36,8 @@ class PredictionCheck {
     double turned = 0, moved = 0;
   };
   static Error error_between(const State& predicted, const State& found);
+  /// That of a prediction that may be right.
+  static bool is_small(const Error& off);
   /// The prediction at `t` was off by this: those that follow may be as well.
   void begin(Time t, const Error& off);
   /// Of the predictions now, as the last sweeps show it; none while they are right.
@@ -59,6 +63,7 @@ class PredictionCheck {
 
   int sweeps_ = 0;                    // that were learnt from, at most `remembered`
   double share_ = 0;                  // of what met a surface: beside it
+  double on_surfaces_ = 0;            // of a sweep
   unsigned contradicted_sweeps_ = 0;  // in a row, whatever was tried
   std::optional<Error> error_;
   double begun_ = 0;           // how often of late predictions contradicted the sweeps

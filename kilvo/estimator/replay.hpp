@@ -74,8 +74,9 @@ class Replay {
   /// The last estimate remembered that is not later than `t`, else `oldest`.
   const Estimate& nearest(Time t, const Estimate& oldest) const;
 
-  /// The accelerometer's samples after the time of `base` are not used: replaced by gravity, and marked as clipped.
-  void doubt_acceleration(const Estimate& base);
+  /// The samples after the time of `base` are not used: the accelerometer's are replaced by gravity, the `gyro`'s by its rate there, and
+  /// are marked as clipped.
+  void doubt_samples(const Estimate& base, bool gyro);
 
   /// The oldest estimate that will be replayed has changed.
   void forget_estimates() {

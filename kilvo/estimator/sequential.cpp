@@ -1,8 +1,10 @@
 // The sequential phase: sweeps and images update the state at their own times; what came since is propagated again.
 #include <algorithm>
+#include <numbers>
 
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/filter/gap.hpp"
+#include "kilvo/math/decimals.hpp"
 #include "kilvo/math/stopwatch.hpp"
 
 namespace kilvo {
@@ -21,6 +23,10 @@ std::optional<Eigen::Vector3d> direction_of(const PoseCovariance& part) {
   Eigen::Index most = 0;
   if (position.diagonal().maxCoeff(&most) < 1.0 / 3) return std::nullopt;
   return position.col(most).normalized();
+}
+
+std::string text_of(const PredictionCheck::Error& off) {
+  return decimals(off.moved, 2) + " m and " + decimals(off.turned * 180 / std::numbers::pi, 1) + " degrees";
 }
 
 void judge(const PredictionCheck& check, const Findings::Situation& now, Findings& findings) {
@@ -52,6 +58,7 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   const Time middle = std::max(history_.base().t, end - (end - begin) / 2);
   Estimate prior = history_.at(middle);
   history_.record_from(prior, end);
+  const State predicted = prior.x;
   if (!lidar_.has_shape(end, prior)) return findings_.drop(Sensor::lidar, Reason::before_motion);
   Statistics& statistics = findings_.statistics();
   const bool first = map_.surfaces().empty(), without_legs = !status_.has_legs();
@@ -71,6 +78,8 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
     return history_.advance_to(end);
   }
   if (sweep.searched) lidar_.rejoin();
+  if (const auto off = PredictionCheck::error_between(predicted, sweep.posterior.x); sweep.unpredicted && !PredictionCheck::is_small(off))
+    findings_.report(situation(), Sensor::lidar, Reason::not_where_predicted, off.moved, text_of(off));
   if (config_.lidar.least_ratio > 0 && eigenvalue_ratio(sweep.points) < config_.lidar.least_ratio)
     return findings_.drop(Sensor::lidar, Reason::agrees_with_nothing);
   history_.resume(sweep.posterior);

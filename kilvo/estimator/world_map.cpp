@@ -45,11 +45,11 @@ Registration WorldMap::measure(LidarPipeline& lidar, const Sweep& sweep, const H
   return out;
 }
 
-WorldMap::Attempt WorldMap::attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops& drops) const {
+WorldMap::Attempt WorldMap::attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops drops) const {
   const Estimate prior = history.at(middle);
   history.record_from(prior, sweep.end);
   Registration found = measure(lidar, sweep, history, prior, drops);
-  return {std::move(history), prior, std::move(found)};
+  return {std::move(history), prior, std::move(found), drops};
 }
 
 Registration WorldMap::measure_near(LidarPipeline& lidar, const Sweep& sweep, const History& history, Estimate prior,
@@ -57,6 +57,42 @@ Registration WorldMap::measure_near(LidarPipeline& lidar, const Sweep& sweep, co
   PointDrops counted;
   prior.x = measure(lidar, sweep, history, released, counted).posterior.x;
   return measure(lidar, sweep, history, prior, counted);
+}
+
+bool WorldMap::agrees(const Estimate& prior, const Registration& sweep) const {
+  return !sweep.refused && LidarPipeline::squared_change(prior, sweep, error_at(prior.x.pose())) < LidarPipeline::agreeing_change;
+}
+
+std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior,
+                                                   const Registration& out) {
+  const bool is_contradicted = prediction_.contradicts(out), searches = is_contradicted && prediction_.is_to_be_searched_for();
+  const auto explains = [&](const Registration& again) {
+    return is_contradicted ? prediction_.explains(again, out) : again.carries && !again.refused;
+  };
+  const auto on_surfaces = [](const Registration& r) { return static_cast<double>(r.report.matched) / std::max(1, r.report.clusters); };
+  constexpr double clearly = 1.01;  // times as many
+  std::optional<Attempt> best;
+  bool is_another = false;
+  const auto consider = [&](std::optional<History> other) {
+    if (!other) return false;
+    Attempt again = attempt(lidar, sweep, std::move(*other), prior.t);
+    if (!(is_contradicted ? explains(again.sweep) : agrees(again.prior, again.sweep))) return false;
+    if (best && on_surfaces(again.sweep) < clearly * on_surfaces(best->sweep)) return false;
+    best = std::move(again);
+    return true;
+  };
+  if (!out.searched) {
+    Registration near = measure_near(lidar, sweep, history, prior, PredictionCheck::released(prior));
+    if (searches && !explains(near)) near = measure_near(lidar, sweep, history, prior, PredictionCheck::lost(prior));
+    const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
+    if (explains(near) && consider(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs())))
+      prediction_.begin(prior.t, off);
+    if (explains(near) && is_contradicted) is_another = consider(history.moved(off.turned, off.moved));
+  }
+  if (searches) is_another |= consider(history.doubted(sweep.end, false));
+  if (searches) is_another |= consider(history.doubted(sweep.end, true));
+  if (best) best->sweep.unpredicted = is_another;
+  return best;
 }
 
 Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, History& history, Estimate& prior, PointDrops& drops) {
@@ -69,44 +105,32 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, 
   };
   const auto& doubt = prediction_.error();
   if (auto doubted = doubt ? history.loosened(prior.t, doubt->turned, doubt->moved, prediction_.lasts()) : std::nullopt) {
-    PointDrops counted = drops;
-    if (Attempt other = attempt(lidar, sweep, std::move(*doubted), prior.t, counted); other.sweep.carries) {
+    if (Attempt other = attempt(lidar, sweep, std::move(*doubted), prior.t, drops); other.sweep.carries) {
+      drops = other.drops;
       go_on_with(std::move(other));
-      drops = counted;
     }
   }
   // A doubt of a prior from which the sweep fits nowhere leaves no trace.
   if (!out.carries) out = measure(lidar, sweep, history, prior, drops);
-  const auto try_again_with = [&](std::optional<History> other, const auto& is_right) {
-    if (!other) return false;
-    PointDrops counted;
-    Attempt again = attempt(lidar, sweep, std::move(*other), prior.t, counted);
-    if (again.sweep.refused || !again.sweep.carries || !is_right(again.prior, again.sweep)) return false;
-    go_on_with(std::move(again));
-    return true;
-  };
-  const auto agrees = [&](const Estimate& expected, const Registration& again) {
-    return LidarPipeline::squared_change(expected, again, error_at(expected.x.pose())) < LidarPipeline::agreeing_change;
-  };
   const auto surprise = prediction_.surprise(prior, out, error_at(prior.x.pose()), lidar.is_rejoining());
   const bool is_contradicted = prediction_.contradicts(out);
+  // Beside surfaces at a pose that is not where it was predicted, or right after a sweep that was: the pose is not known.
+  const bool is_lost = is_contradicted && (out.refused || !agrees(prior, out) || (lidar.is_rejoining() && prediction_.was_contradicted()));
+  std::optional<Attempt> other;
   if (is_contradicted || surprise == PredictionCheck::Surprise::again) {
-    const auto explains = [&](const Registration& again) {
-      return is_contradicted ? prediction_.explains(again, out) : again.carries && !again.refused;
-    };
-    Registration near = measure_near(lidar, sweep, history, prior, PredictionCheck::released(prior));
-    if (is_contradicted && !explains(near) && prediction_.is_to_be_searched_for())
-      near = measure_near(lidar, sweep, history, prior, PredictionCheck::lost(prior));
-    const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
-    const auto is_right = [&](const Estimate& expected, const Registration& again) {
-      return is_contradicted ? explains(again) : agrees(expected, again);
-    };
-    if (explains(near) && try_again_with(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs()), is_right))
-      prediction_.begin(prior.t, off);
+    other = explain(lidar, sweep, history, prior, out);
   } else if (surprise == PredictionCheck::Surprise::first) {
-    try_again_with(history.loosened(prior.t, 0, (out.posterior.x.p - prior.x.p).norm(), false), agrees);
-  } else if (out.searched && out.refused == Reason::fits_nowhere) {
-    try_again_with(history.doubted(sweep.end), [](const auto&...) { return true; });
+    if (auto pushed = history.loosened(prior.t, 0, (out.posterior.x.p - prior.x.p).norm(), false)) {
+      other = attempt(lidar, sweep, std::move(*pushed), prior.t);
+      if (!other->sweep.carries || !agrees(other->prior, other->sweep)) other.reset();
+    }
+  }
+  if (other) {
+    go_on_with(std::move(*other));
+  } else if (is_lost && !out.refused) {
+    out.refused = Reason::fits_nowhere;
+    out.carries = false;
+    out.posterior = prior;
   }
   prediction_.learn(predicted, out, error_at(predicted.x.pose()));
   return out;

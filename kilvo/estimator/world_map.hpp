@@ -56,11 +56,17 @@ class WorldMap {
     History history;
     Estimate prior;
     Registration sweep;
+    PointDrops drops;
   };
 
   Registration measure(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior, PointDrops& drops) const;
   /// As another history predicts it.
-  Attempt attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops& drops) const;
+  Attempt attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops drops = {}) const;
+  /// What else may have been than `history`, from which the sweep is beside the surfaces or is not where it was predicted: a pose near by,
+  /// one that the IMU has not moved to, or samples that are wrong. The best of those that explain it.
+  std::optional<Attempt> explain(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior,
+                                 const Registration& out);
+  bool agrees(const Estimate& prior, const Registration& sweep) const;
   /// From where it is found from `released`, with the gate of the prior: that of an uncertain one lets almost everything lie on the
   /// surfaces.
   Registration measure_near(LidarPipeline& lidar, const Sweep& sweep, const History& history, Estimate prior,
