@@ -39,11 +39,11 @@ Estimate History::record_from(const Estimate& e, Time until) {
   return ahead;
 }
 
-std::optional<History> History::doubted(Time end, bool gyro) const {
+std::optional<History> History::doubted(Time end, const std::optional<Eigen::Vector3d>& rate) const {
   constexpr Duration longest = std::chrono::seconds(1);
   if (end - base_.t > longest) return std::nullopt;
   std::optional<History> out(*this);
-  out->replay_.doubt_samples(base_, gyro);
+  out->replay_.doubt_samples(base_, rate);
   out->correct_trajectory(base_, Eigen::Vector3d::Zero());  // nothing after it
   return out;
 }

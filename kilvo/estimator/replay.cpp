@@ -260,16 +260,16 @@ const Estimate& Replay::nearest(Time t, const Estimate& oldest) const {
   return after == remembered_.begin() ? oldest : *(after - 1);
 }
 
-void Replay::doubt_samples(const Estimate& base, bool gyro) {
-  const Eigen::Vector3d rate = imu_at(base.t).gyro;
+void Replay::doubt_samples(const Estimate& base, const std::optional<Eigen::Vector3d>& rate) {
   forget_estimates();
   usual_.accel_density2 = usual_.accel_bend2 = 0;  // they were of what is wrong
   for (ImuSample& s : imu_) {
     if (s.t <= base.t) continue;
     s.accel = base.x.ba - base.x.R.inverse() * base.x.g;
     s.accel_clipped = true;
-    if (gyro) s.gyro = rate;
-    s.gyro_clipped = s.gyro_clipped || gyro;
+    if (!rate) continue;
+    s.gyro = *rate;
+    s.gyro_clipped = true;
   }
 }
 

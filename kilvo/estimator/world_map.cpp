@@ -70,7 +70,7 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
     return is_contradicted ? prediction_.explains(again, out) : again.carries && !again.refused;
   };
   const auto on_surfaces = [](const Registration& r) { return static_cast<double>(r.report.matched) / std::max(1, r.report.clusters); };
-  constexpr double clearly = 1.01;  // times as many
+  constexpr double clearly = 1.03;  // times as many
   std::optional<Attempt> best;
   bool is_another = false;
   const auto consider = [&](std::optional<History> other) {
@@ -85,12 +85,14 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
     Registration near = measure_near(lidar, sweep, history, prior, PredictionCheck::released(prior));
     if (searches && !explains(near)) near = measure_near(lidar, sweep, history, prior, PredictionCheck::lost(prior));
     const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
-    if (explains(near) && consider(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs())))
-      prediction_.begin(prior.t, off);
+    if (explains(near) && consider(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs()))) prediction_.begin(prior.t, off);
     if (explains(near) && is_contradicted) is_another = consider(history.moved(off.turned, off.moved));
   }
-  if (searches) is_another |= consider(history.doubted(sweep.end, false));
-  if (searches) is_another |= consider(history.doubted(sweep.end, true));
+  if (searches) {
+    const Replay& samples = history.replay();
+    for (const auto& rate : {std::optional<Eigen::Vector3d>(), samples.gyro_at(history.base().t), std::optional(samples.mean_gyro())})
+      is_another |= consider(history.doubted(sweep.end, rate));
+  }
   if (best) best->sweep.unpredicted = is_another;
   return best;
 }
