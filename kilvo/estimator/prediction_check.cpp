@@ -20,18 +20,19 @@ Estimate inflated(const Estimate& prior, double part) {
   return out;
 }
 
-double share_matched(const RegistrationReport& report) { return report.matched / std::max(1.0, static_cast<double>(report.clusters)); }
-
 bool measures(const Registration& sweep) { return !sweep.refused && sweep.carries && met(sweep.report) > 0; }
 
 }  // namespace
 
-bool PredictionCheck::contradicts(const Registration& sweep) const {
-  constexpr int told_apart = 10;                  // sweeps
+bool PredictionCheck::lies_beside(const RegistrationReport& report) const {
   constexpr double clearly = 0.1, by_chance = 4;  // -, standard deviations
+  return share_beside(report) > share_ + std::max(clearly, by_chance * std::sqrt(share_ * (1 - share_) / met(report)));
+}
+
+bool PredictionCheck::contradicts(const Registration& sweep) const {
+  constexpr int told_apart = 10;  // sweeps
   if (sweep.refused) return sweep.refused == Reason::fits_nowhere;
-  if (gives_up() || sweeps_ < told_apart || sweep.searched || met(sweep.report) == 0) return false;
-  return share_beside(sweep.report) > share_ + std::max(clearly, by_chance * std::sqrt(share_ * (1 - share_) / met(sweep.report)));
+  return !gives_up() && sweeps_ >= told_apart && !sweep.searched && met(sweep.report) > 0 && lies_beside(sweep.report);
 }
 
 bool PredictionCheck::is_unusual(double change) const {
@@ -61,10 +62,8 @@ Estimate PredictionCheck::released(const Estimate& prior) { return inflated(prio
 Estimate PredictionCheck::lost(const Estimate& prior) { return inflated(prior, 3); }
 
 bool PredictionCheck::explains(const Registration& again, const Registration& sweep) const {
-  const bool is_registered = !again.refused && again.carries && share_matched(again.report) > 0.7 * on_surfaces_;
-  const double left = share_beside(again.report) - share_, before = share_beside(sweep.report) - share_;
-  if (sweep.refused) return is_registered && left < 0.15;
-  return is_registered && left < std::min(0.15, 0.5 * before) && again.report.matched > sweep.report.matched;
+  if (again.refused || !again.carries || again.report.matched <= sweep.report.matched || lies_beside(again.report)) return false;
+  return sweep.refused || share_beside(again.report) - share_ < 0.5 * (share_beside(sweep.report) - share_);
 }
 
 PredictionCheck::Error PredictionCheck::error_between(const State& predicted, const State& found) {
@@ -122,7 +121,6 @@ void PredictionCheck::learn(const Estimate& prior, const Registration& sweep, co
   sweeps_ = std::min(sweeps_ + 1, remembered);
   if (!gives_up()) begun_ -= begun_ / remembered;
   share_ += (share_beside(sweep.report) - share_) / sweeps_;
-  on_surfaces_ += (share_matched(sweep.report) - on_surfaces_) / sweeps_;
 }
 
 }  // namespace kilvo

@@ -59,11 +59,11 @@ class PredictionCheck {
   static constexpr int enough = 5, remembered = 50;  // sweeps
   static constexpr double too_often = 5;             // contradictions of late, about one in ten sweeps: no IMU changes so often
 
+  bool lies_beside(const RegistrationReport& report) const;
   bool is_unusual(double change) const;
 
   int sweeps_ = 0;                    // that were learnt from, at most `remembered`
   double share_ = 0;                  // of what met a surface: beside it
-  double on_surfaces_ = 0;            // of a sweep
   unsigned contradicted_sweeps_ = 0;  // in a row, whatever was tried
   std::optional<Error> error_;
   double begun_ = 0;           // how often of late predictions contradicted the sweeps

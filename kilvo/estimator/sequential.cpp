@@ -25,11 +25,13 @@ std::optional<Eigen::Vector3d> direction_of(const PoseCovariance& part) {
   return position.col(most).normalized();
 }
 
-std::string text_of(const PredictionCheck::Error& off) {
-  return decimals(off.moved, 2) + " m and " + decimals(off.turned * 180 / std::numbers::pi, 1) + " degrees";
-}
-
-void judge(const PredictionCheck& check, const Findings::Situation& now, Findings& findings) {
+// Against what the sweep was expected to find.
+void judge(const PredictionCheck& check, const State& expected, const Registration& sweep, const Findings::Situation& now,
+           Findings& findings) {
+  const auto off = PredictionCheck::error_between(expected, sweep.posterior.x);
+  if (sweep.unpredicted && !PredictionCheck::is_small(off))
+    findings.report(now, Sensor::lidar, Reason::not_where_predicted, off.moved,
+                    decimals(off.moved, 2) + " m and " + decimals(off.turned * 180 / std::numbers::pi, 1) + " degrees");
   if (!check.lasts() && (!check.is_hopeless() || findings.statistics().diverged)) return;
   findings.contradict(check.is_hopeless() ? Reason::diverged : Reason::inconsistent, Sensor::imu, Sensor::lidar,
                       check.error().value_or(PredictionCheck::Error{}).moved,
@@ -58,13 +60,13 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   const Time middle = std::max(history_.base().t, end - (end - begin) / 2);
   Estimate prior = history_.at(middle);
   history_.record_from(prior, end);
-  const State predicted = prior.x;
   if (!lidar_.has_shape(end, prior)) return findings_.drop(Sensor::lidar, Reason::before_motion);
   Statistics& statistics = findings_.statistics();
   const bool first = map_.surfaces().empty(), without_legs = !status_.has_legs();
+  const State expected = prior.x;
   const Registration sweep =
       map_.register_sweep(lidar_, {scan, end, without_legs, legs_.description_error(prior.x)}, history_, prior, statistics.points);
-  judge(map_.prediction(), situation(), findings_);
+  judge(map_.prediction(), expected, sweep, situation(), findings_);
   statistics.searches += sweep.searched ? 1 : 0;
   statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
   if (sweep.refused) {
@@ -78,8 +80,6 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
     return history_.advance_to(end);
   }
   if (sweep.searched) lidar_.rejoin();
-  if (const auto off = PredictionCheck::error_between(predicted, sweep.posterior.x); sweep.unpredicted && !PredictionCheck::is_small(off))
-    findings_.report(situation(), Sensor::lidar, Reason::not_where_predicted, off.moved, text_of(off));
   if (config_.lidar.least_ratio > 0 && eigenvalue_ratio(sweep.points) < config_.lidar.least_ratio)
     return findings_.drop(Sensor::lidar, Reason::agrees_with_nothing);
   history_.resume(sweep.posterior);
