@@ -98,6 +98,7 @@ class History {
 
  private:
   static constexpr Duration longest_correction = std::chrono::milliseconds(300);  // of what is past
+  static constexpr double longest_doubt = 1.5;                                    // s, since the last sweep
 
   Trajectory* record() { return is_fork_ ? nullptr : &trajectory_; }
 

@@ -30,9 +30,8 @@ bool PredictionCheck::lies_beside(const RegistrationReport& report) const {
 }
 
 bool PredictionCheck::contradicts(const Registration& sweep) const {
-  constexpr int told_apart = 10;  // sweeps
   if (sweep.refused) return sweep.refused == Reason::fits_nowhere;
-  return !gives_up() && sweeps_ >= told_apart && !sweep.searched && met(sweep.report) > 0 && lies_beside(sweep.report);
+  return !gives_up() && sweeps_ >= 2 * enough && !sweep.searched && met(sweep.report) > 0 && lies_beside(sweep.report);
 }
 
 bool PredictionCheck::is_unusual(double change) const {
