@@ -7,11 +7,11 @@
 namespace kilvo::lab {
 namespace {
 
-// A message cannot come before what it tells. Only the IMU's own delay can make it seem so, which is no second: the IMU is read live. On
-// the other side, what is compressed, queued and sent over a radio may come seconds late, and is late then (the estimator says so); no
-// driver keeps a message for ten seconds.
-constexpr Duration most_early = std::chrono::seconds(1), most_late = std::chrono::seconds(10);
-// Another clock is believed after so long, and so many messages. One wrong stamp, or what had waited for the recorder, is outvoted by then.
+// A message cannot come before what it tells. Only the IMU's own delay can make it seem so, and an IMU that comes two seconds late serves
+// no robot. On the other side, what is compressed, queued and sent over a radio may come seconds late, and is late then (the estimator says
+// so); no driver keeps a message for ten seconds.
+constexpr Duration most_early = std::chrono::seconds(2), most_late = std::chrono::seconds(10);
+// Another clock is believed after so long, and so many messages.
 constexpr Duration evidence = std::chrono::seconds(1);
 constexpr std::size_t fewest = 3;
 // Sensors whose clocks seem so near to each other have one and the same: what is between them are their delays. Devices that have
@@ -28,18 +28,19 @@ Time completion_of(const Measurement& m) {
 }
 
 struct Delays {
-  Duration median, least;  // the least of those that are of the same clock as most
+  Duration usual, least;
 };
 
+// What had waited for the recorder comes with long delays, nine in ten at most; one wrong stamp may make a delay as short as it likes.
 template <class T>
 Delays summary_of(const T& of) {
   std::vector<Duration> all;
   for (const auto& x : of) all.push_back(x.delay);
-  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-  std::ranges::nth_element(all, middle);
-  Delays out{*middle, *middle};
+  const auto low = all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size() - 1, std::max<std::size_t>(1, all.size() / 10)));
+  std::ranges::nth_element(all, low);
+  Delays out{*low, *low};
   for (const Duration d : all) {
-    if (out.median - d < most_early) out.least = std::min(out.least, d);
+    if (out.usual - d < one_clock) out.least = std::min(out.least, d);
   }
   return out;
 }
@@ -70,7 +71,7 @@ void SensorClocks::judge(Sensor s, Time arrived) {
   const Stream& imu = streams_[index_of(Sensor::imu)];
   if (imu.delays.empty()) return;
   const Delays its = summary_of(stream.delays), of_imu = summary_of(imu.delays);
-  const bool is_same = is_possible(its.median - of_imu.median);
+  const bool is_same = is_possible(its.usual - of_imu.usual);
   const bool is_enough =
       stream.delays.size() >= fewest && imu.delays.size() >= fewest && arrived - std::max(*stream.first, *imu.first) >= evidence;
   if (!is_same && !is_enough) return;

@@ -121,7 +121,7 @@ TEST(SensorClocks, OfSeveralOtherClocksEachIsMovedByItself) {
 }
 
 TEST(SensorClocks, ADelayOfSecondsAndAClockThatIsSlightlyAheadAreLeftAlone) {
-  for (const Duration by : {Duration(-seconds(3)), Duration(milliseconds(800))}) {
+  for (const Duration by : {Duration(-seconds(3)), Duration(milliseconds(1800))}) {
     Robot robot;
     robot.clock[index_of(Sensor::legs)] = by;
     EXPECT_NEAR(result_of(robot).worst[index_of(Sensor::legs)], to_seconds(by), 1e-9);
@@ -134,11 +134,13 @@ TEST(SensorClocks, TheImuMayComeLaterThanTheOthersAndItsFirstMessagesLate) {
     robot.begin[0] = milliseconds(700);
     if (another) robot.clock[index_of(Sensor::legs)] = -to_uptime;
     auto arrivals = robot.arrivals();
-    // What had waited for the recorder: twenty samples of the IMU come at once, the first of them two seconds late.
-    int waited = 0;
-    for (auto& a : arrivals) {
-      if (std::holds_alternative<ImuSample>(a.m) && ++waited <= 20) std::get<ImuSample>(a.m).t -= seconds(2);
-    }
+    // What had waited for the recorder: six hundred samples of the IMU come at once, the first of them three seconds late.
+    const Time opened = day + robot.begin[0] + milliseconds(1);
+    std::vector<Robot::Arrival> waited;
+    for (Duration before = seconds(3); before > Duration(0); before -= milliseconds(5))
+      waited.push_back({ImuSample{opened - before}, opened, opened - before});
+    const auto first = std::ranges::find_if(arrivals, [](const auto& a) { return std::holds_alternative<ImuSample>(a.m); });
+    arrivals.insert(first, waited.begin(), waited.end());
     SensorClocks clocks;
     const Result result = result_of(clocks, arrivals, Duration(0));
     EXPECT_EQ(clocks.offset(Sensor::legs).has_value(), another);
