@@ -35,6 +35,7 @@ struct Delays {
 template <class T>
 Delays summary_of(const T& of) {
   std::vector<Duration> all;
+  all.reserve(of.size());
   for (const auto& x : of) all.push_back(x.delay);
   const auto low = all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size() - 1, std::max<std::size_t>(1, all.size() / 10)));
   std::ranges::nth_element(all, low);
