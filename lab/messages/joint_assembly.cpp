@@ -7,16 +7,18 @@
 namespace kilvo::lab {
 namespace {
 
-// For so long parts wait for the others: controllers that are started together all speak by then.
+// For so long parts wait for the others, and arms for the legs: controllers that are started together all speak by then.
 constexpr Duration patience = std::chrono::seconds(1);
 
 }  // namespace
 
 std::optional<JointSample> JointAssembly::join(JointSample message, Time arrived) {
-  if (comes_whole_ || needed_.empty() || message.names.size() != message.position.size()) return message;
+  if (needed_.empty() || message.names.size() != message.position.size()) return message;
   if (message.names != names_) look_up(message.names);
-  comes_whole_ = found_ == needed_.size();
-  if (comes_whole_ || found_ == 0) return message;
+  if (!legs_ || arrived < *legs_ || found_ > 0) legs_ = arrived;
+  if (found_ == 0) return arrived - *legs_ > patience ? std::optional(std::move(message)) : std::nullopt;
+  comes_whole_ = comes_whole_ || found_ == needed_.size();
+  if (comes_whole_) return message;
   note(message);
   // The one that came now stands for its part.
   const auto place = std::ranges::find_if(places_, [](const auto& p) { return p.has_value(); });

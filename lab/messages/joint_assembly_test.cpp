@@ -143,13 +143,28 @@ TEST(JointAssembly, ALegThatIsNeverThereIsNamedAfterASecond) {
   for (int ms = 0; ms < 3000; ms += 2) EXPECT_EQ(assembly.join(part(left, ms), at(ms)).has_value(), ms > 1000) << ms;
 }
 
-TEST(JointAssembly, ArmsAreGivenBackAsTheyAre) {
-  JointAssembly assembly(both);
+TEST(JointAssembly, ArmsBesideLegsAreLeftOutWhoeverComesFirst) {
   const JointNames arms{"left_elbow", "right_elbow"};
-  const auto out = joined(assembly, {part(left, 0), part(arms, 0), part(right, 0)});
-  ASSERT_EQ(out.size(), 2U);
-  EXPECT_EQ(out[0].names, arms);
-  EXPECT_EQ(out[1].names, both);
+  for (const bool in_parts : {true, false}) {
+    JointAssembly assembly(both);
+    std::vector<JointSample> messages;
+    for (int ms = 0; ms < 3000; ms += 2) {
+      messages.push_back(part(arms, ms));
+      if (in_parts) messages.push_back(part(left, ms));
+      messages.push_back(part(in_parts ? right : both, ms));
+    }
+    const auto out = joined(assembly, messages);
+    EXPECT_EQ(out.size(), 1500U);
+    for (const JointSample& sample : out) EXPECT_EQ(sample.names, both);
+  }
+}
+
+TEST(JointAssembly, AnotherRobotsMessagesAreGivenBackAfterASecond) {
+  JointAssembly assembly(both);
+  for (int ms = 0; ms < 3000; ms += 2) {
+    EXPECT_EQ(assembly.join(part({"wheel"}, ms), at(ms)).has_value(), ms > 1000) << ms;
+    EXPECT_FALSE(assembly.is_of_legs());
+  }
 }
 
 TEST(JointAssembly, GoesOnWhenTheTimeStepsBack) {

@@ -38,6 +38,7 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
   if (joints == nullptr) return std::move(decoded->measurement);
   auto whole = assembly_.join(std::move(*joints), arrived);
   counts_.unused_parts = assembly_.unused();
+  if (!whole && !assembly_.is_of_legs()) take_back("no joint of the legs");
   if (!whole) return std::nullopt;
   return *std::move(whole);
 }
