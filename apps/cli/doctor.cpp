@@ -39,6 +39,9 @@ lab::Recorded record(const DoctorOptions& options, lab::RecordingOptions wanted)
     lab::RecordingSource source(options.input, what);
     lab::Recorder recorder(what.leg_clock.has_value(), options.exact);
     while (const auto measurement = source.next()) recorder.push(*measurement);
+    for (const Sensor sensor : all_sensors) {
+      if (const std::string text = source.clocks().finding(sensor); !text.empty()) fmt::print(stderr, "kilvo: warning: {}\n", text);
+    }
     return recorder.finish();
   };
   if (!wanted[Sensor::lidar].use) return read(wanted);

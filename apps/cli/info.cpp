@@ -13,6 +13,7 @@
 #include "lab/messages/input_error.hpp"
 #include "lab/recordings/description.hpp"
 #include "lab/recordings/recording_source.hpp"
+#include "lab/settings/leg_joints.hpp"
 #include "lab/settings/nearest.hpp"
 
 namespace kilvo::cli {
@@ -112,6 +113,7 @@ int info(const InfoOptions& options) {
     wanted[sensor].use = settings.has(sensor);
     wanted[sensor].topic = settings.topic(sensor);
   }
+  wanted[Sensor::legs].joints = lab::leg_joints(settings.robot);
   const lab::RecordingDescription about = lab::describe_recording(options.paths(), wanted);
   const std::string chunks = about.storage.chunks > 0 ? fmt::format(" in {} chunks", about.storage.chunks) : "";
   fmt::print("{}: {}, {:.1f} MB, {:.3f} s, {} messages{} ({})\n", about.file, about.storage.format, static_cast<double>(about.bytes) * 1e-6,

@@ -1,5 +1,7 @@
 #include "apps/cli/recording_options.hpp"
 
+#include "lab/settings/leg_joints.hpp"
+
 namespace kilvo::cli {
 
 lab::RecordingOptions recording_options(const lab::Settings& settings, const std::vector<Sensor>& used) {
@@ -7,6 +9,7 @@ lab::RecordingOptions recording_options(const lab::Settings& settings, const std
   lab::RecordingOptions out;
   for (const Sensor sensor : used) out[sensor] = {true, settings.topic(sensor), rates[index_of(sensor)], offsets[index_of(sensor)]};
   out[Sensor::imu].gyro_scale = settings.robot.imu.gyro_scale;
+  if (out[Sensor::legs].use) out[Sensor::legs].joints = lab::leg_joints(settings.robot);
   if (out[Sensor::legs].use && settings.leg_clock.clock != "stamp") out.leg_clock.emplace(settings.leg_clock, settings.robot);
   return out;
 }

@@ -39,6 +39,7 @@ Json messages_json(const RunFacts& facts, const lab::RecordingSource& source, co
     for (const auto& [cause, n] : estimator.dropped) dropped[cause] += n;
     if (const std::uint64_t n = facts.withheld[static_cast<std::size_t>(sensor)]; n > 0) dropped["drop_option"] = n;
     out[name_of(sensor)] = {{"topic", source.topic(sensor)}, {"used", estimator.used}, {"dropped", dropped}};
+    if (const auto& by = source.clocks().offset(sensor)) out[name_of(sensor)]["clock_moved_s"] = to_seconds(*by);
   }
   return out;
 }

@@ -62,6 +62,8 @@ DiagnosticStatus status_of(Sensor sensor, const Condition& c) {
   if (!input.connection.empty()) add(out, "connection", input.connection);
   for (const auto& [cause, count] : input.counts.dropped) add(out, "dropped: " + cause, std::to_string(count));
   if (sensor == Sensor::legs && input.clock) add(out, "clock found (s)", fmt::format("{:+.4f}", *input.clock));
+  if (input.moved) add(out, "stamps of another clock, moved by (s)", fmt::format("{:+.6f}", *input.moved));
+  if (input.counts.unused_parts > 0) add(out, "parts of the joints not used", std::to_string(input.counts.unused_parts));
   if (input.counts.unstamped > 0) add(out, "without a stamp", std::to_string(input.counts.unstamped));
   const SensorCount& seen = c.seen.sensors[s];
   add(out, "used", std::to_string(seen.used));

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "lab/messages/message_decoder.hpp"
+#include "lab/settings/leg_joints.hpp"
 
 namespace kilvo::node {
 namespace {
@@ -22,11 +23,16 @@ std::string accepted_text(Sensor sensor) {
 }  // namespace
 
 SensorInputs::SensorInputs(const lab::Settings& settings, bool no_deskew, Sink sink, Say say)
-    : sink_(std::move(sink)), say_(std::move(say)), lidar_rate_(settings.robot.lidar.rate), leg_clock_(settings.leg_clock, settings.robot) {
+    : sink_(std::move(sink)),
+      say_(std::move(say)),
+      lidar_rate_(settings.robot.lidar.rate),
+      leg_clock_(settings.leg_clock, settings.robot),
+      clocks_(time_offsets_of(settings.robot)) {
   if (no_deskew) point_time_.emplace();
   for (const Sensor sensor : all_sensors) {
     input_of(sensor).topic = settings.topic(sensor);
-    input_of(sensor).intake = lab::SensorIntake(time_offsets_of(settings.robot)[index_of(sensor)], settings.robot.imu.gyro_scale);
+    input_of(sensor).intake = lab::SensorIntake(time_offsets_of(settings.robot)[index_of(sensor)], settings.robot.imu.gyro_scale, true,
+                                                sensor == Sensor::legs ? lab::leg_joints(settings.robot) : JointNames());
   }
 }
 
@@ -64,12 +70,13 @@ void SensorInputs::take(Sensor sensor, const Arrived& arrived) {
   {
     const std::lock_guard lock(input.mutex);
     measurement = input.intake.take(sensor, arrived.type, arrived.message, arrived.at, point_time);
-    if (measurement) input.fault.clear();
+    if (input.intake.newest_fault().empty()) input.fault.clear();
     if (measurement && is_quick(sensor) && !give_time(input, *measurement, arrived.at)) return;
   }
+  if (measurement && !bring_onto_imu_clock(input, *measurement, arrived.at)) return;
   if (measurement) {
     sink_(*std::move(measurement), arrived.at);
-  } else {
+  } else if (!input.intake.newest_fault().empty()) {
     complain(input, input.intake.newest_fault());
   }
 }
@@ -81,6 +88,29 @@ bool SensorInputs::give_time(Input& input, Measurement& measurement, Time arrive
   input.clock = leg_clock_.offset();
   if (why != nullptr) input.intake.take_back(why);
   return why == nullptr;
+}
+
+// False: it is not to be used, since the sensor's clock is not known yet.
+bool SensorInputs::bring_onto_imu_clock(Input& input, Measurement& measurement, Time arrived) {
+  const Sensor sensor = sensor_of(measurement);
+  std::optional<Duration> by;
+  std::string finding;
+  bool known = false;
+  {
+    const std::lock_guard lock(clocks_mutex_);
+    clocks_.note(measurement, arrived);
+    known = clocks_.knows(sensor);
+    if (known) clocks_.correct(measurement);
+    by = clocks_.offset(sensor);
+    if (by && !input.moved) finding = clocks_.finding(sensor);
+  }
+  {
+    const std::lock_guard lock(input.mutex);
+    if (!known) input.intake.take_back("clock not known yet");
+    if (by) input.moved = to_seconds(*by);
+  }
+  if (!finding.empty()) say_(finding);
+  return known;
 }
 
 // The first clouds wait until they have shown how their points' times are written.
@@ -133,7 +163,8 @@ void SensorInputs::note_connection(Sensor sensor, const std::string& fault) {
 InputState SensorInputs::state(Sensor sensor) const {
   const Input& input = inputs_[static_cast<std::size_t>(sensor)];
   const std::lock_guard lock(input.mutex);
-  return {input.topic, input.messages, input.last, input.intake.counts(), input.fault, input.connection, input.paused, input.clock};
+  return {input.topic,  input.messages, input.last, input.intake.counts(), input.fault, input.connection,
+          input.paused, input.clock,    input.moved};
 }
 
 }  // namespace kilvo::node

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "lab/clocks/leg_clock.hpp"
+#include "lab/clocks/sensor_clocks.hpp"
 #include "lab/messages/point_time_search.hpp"
 #include "lab/messages/sensor_intake.hpp"
 #include "lab/settings/settings.hpp"
@@ -30,6 +31,7 @@ struct InputState {
   std::string connection;  // what keeps others' messages from coming at all
   bool paused = false;
   std::optional<double> clock;  // of the legs: found, and added to the times of arrival, s
+  std::optional<double> moved;  // s, added to the stamps, which are of another clock than the IMU's
 };
 
 /// IMU and legs come on one thread, so that nothing keeps them waiting; clouds and images on another.
@@ -80,12 +82,13 @@ class SensorInputs {
     std::string fault;           // of the newest message
     std::set<std::string> said;  // kinds of faults that the user was told, without their numbers
     std::string connection;
-    std::optional<double> clock;
+    std::optional<double> clock, moved;
   };
 
   bool note_arrival(Input& input, bool is_compressed);
   void take(Sensor sensor, const Arrived& arrived);
   bool give_time(Input& input, Measurement& measurement, Time arrived);
+  bool bring_onto_imu_clock(Input& input, Measurement& measurement, Time arrived);
   void search_point_time(const Arrived& arrived);
   void complain(Input& input, const std::string& fault);
   Input& input_of(Sensor sensor) { return inputs_[static_cast<std::size_t>(sensor)]; }
@@ -94,6 +97,8 @@ class SensorInputs {
   Say say_;
   double lidar_rate_;
   lab::LegClock leg_clock_;  // of the thread of IMU and legs
+  std::mutex clocks_mutex_;
+  lab::SensorClocks clocks_;
   // Of the thread of clouds and images:
   std::optional<lab::PointTimeFormat> point_time_;
   std::optional<lab::PointTimeSearch> search_;

@@ -20,6 +20,7 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
     ++counts_.dropped["undecodable"];
     return std::nullopt;
   }
+  newest_fault_.clear();
   ++counts_.used;
   tick_ = decoded->tick;
   gyro_ = decoded->gyro;
@@ -33,7 +34,13 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
     ++counts_.unstamped;
   }
   stamp += from_seconds(time_offset_);
-  return std::move(decoded->measurement);
+  auto* joints = std::get_if<JointSample>(&decoded->measurement);
+  if (joints == nullptr) return std::move(decoded->measurement);
+  auto whole = assembly_.join(std::move(*joints), arrived);
+  counts_.unused_parts = assembly_.unused();
+  if (!whole && !assembly_.is_of_legs()) take_back("no joint of the legs");
+  if (!whole) return std::nullopt;
+  return *std::move(whole);
 }
 
 }  // namespace kilvo::lab

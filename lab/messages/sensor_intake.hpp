@@ -9,6 +9,7 @@
 
 #include "kilvo/sensors/measurement.hpp"
 #include "lab/messages/encoding.hpp"
+#include "lab/messages/joint_assembly.hpp"
 #include "lab/messages/point_time.hpp"
 
 namespace kilvo::lab {
@@ -19,15 +20,18 @@ struct SensorCounts {
   std::map<std::string, std::uint64_t> dropped;  // cause -> messages: "undecodable", "too_large"
   std::uint64_t absurd_point_times = 0;          // points, not messages: dropped from their clouds
   std::uint64_t unstamped = 0;                   // used, with the time of their arrival because their stamp is 0
+  std::uint64_t unused_parts = 0;                // of leg samples: the others did not come in time
 };
 
 class SensorIntake {
  public:
   /// `time_offset`: s, added to the stamps (of a scan: to the time that its points count from). `gyro_scale`: of each axis of an IMU.
-  /// `with_colours`: images are to give them.
-  explicit SensorIntake(double time_offset = 0, const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones(), bool with_colours = true)
-      : time_offset_(time_offset), gyro_scale_(gyro_scale), with_colours_(with_colours) {}
+  /// `with_colours`: images are to give them. `joints`: that a leg sample must have; parts of them are joined.
+  explicit SensorIntake(double time_offset = 0, const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones(), bool with_colours = true,
+                        JointNames joints = {})
+      : time_offset_(time_offset), gyro_scale_(gyro_scale), with_colours_(with_colours), assembly_(std::move(joints)) {}
 
+  /// Nothing when the message cannot be decoded (newest_fault() says why), or is a part of a leg sample that the others are not there for.
   /// `arrived`: when the message was recorded, or received. `point_time` matters for LiDAR types only.
   /// `type` is a plain_type_name() that is_type_of() the sensor.
   std::optional<Measurement> take(Sensor sensor, std::string_view type, const WireMessage& message, Time arrived,
@@ -49,6 +53,7 @@ class SensorIntake {
   const SensorCounts& counts() const { return counts_; }
   /// Why the first undecodable message was; empty without one.
   const std::string& first_fault() const { return first_fault_; }
+  /// Of the message that was taken last; empty when it was decoded.
   const std::string& newest_fault() const { return newest_fault_; }
 
  private:
@@ -56,6 +61,7 @@ class SensorIntake {
   Eigen::Vector3d gyro_scale_;
   bool with_colours_;
   JointNames joint_names_;  // of the message that was taken last
+  JointAssembly assembly_;
   SensorCounts counts_;
   std::string first_fault_, newest_fault_;
   std::optional<std::uint32_t> tick_;

@@ -12,6 +12,17 @@ namespace {
 
 // Seconds beyond which a time from the command line means "for ever".
 constexpr double for_ever = 1e9;
+// So much is held at most until the sensors' clocks are known.
+constexpr std::size_t most_held = 10000;
+constexpr Duration longest_held = std::chrono::seconds(5);
+
+SensorClocks clocks_of(const RecordingOptions& options) {
+  std::array<double, sensor_count> offsets{};
+  for (const Sensor sensor : all_sensors) offsets[index_of(sensor)] = options[sensor].time_offset;
+  SensorClocks clocks(offsets);
+  if (!options[Sensor::imu].use) clocks.give_up();
+  return clocks;
+}
 
 Time after(Time begin, double seconds) { return seconds < for_ever ? begin + from_seconds(std::max(seconds, 0.0)) : Time::max(); }
 
@@ -34,10 +45,11 @@ std::optional<PointTimeFormat> find_point_time(RecordingReader& reader, const Ch
 }
 
 RecordingSource::RecordingSource(const std::vector<std::filesystem::path>& inputs, RecordingOptions options)
-    : reader_(open_recordings(inputs)), options_(std::move(options)) {
+    : reader_(open_recordings(inputs)), options_(std::move(options)), clocks_(clocks_of(options_)) {
   for (const Sensor sensor : all_sensors) {
     if (!options_[sensor].use) continue;
-    intakes_[index_of(sensor)] = SensorIntake(options_[sensor].time_offset, options_[sensor].gyro_scale, options_.with_colours);
+    const SensorInput& wanted = options_[sensor];
+    intakes_[index_of(sensor)] = SensorIntake(wanted.time_offset, wanted.gyro_scale, options_.with_colours, wanted.joints);
     try {
       chosen_[index_of(sensor)] = choose_topic(reader_->connections(), sensor, options_[sensor].topic);
     } catch (const InputError& error) {
@@ -71,8 +83,27 @@ std::optional<Measurement> RecordingSource::decode(Sensor sensor, const RawMessa
   return std::nullopt;
 }
 
-/// A message may be of several sensors: a LowState is of the IMU and of the legs.
 std::optional<Measurement> RecordingSource::next() {
+  while (held_.empty() || !clocks_.knows_all()) {
+    auto measurement = read();
+    if (!measurement) {
+      clocks_.give_up();
+      break;
+    }
+    clocks_.note(*measurement, message_->time);
+    held_.push_back({*std::move(measurement), message_->time});
+    if (held_.size() == most_held || message_->time - held_.front().recorded > longest_held) clocks_.give_up();
+  }
+  if (held_.empty()) return std::nullopt;
+  Measurement out = std::move(held_.front().measurement);
+  recorded_ = held_.front().recorded;
+  held_.pop_front();
+  clocks_.correct(out);
+  return out;
+}
+
+/// A message may be of several sensors: a LowState is of the IMU and of the legs.
+std::optional<Measurement> RecordingSource::read() {
   while (true) {
     for (; message_ && next_sensor_ < sensor_count; ++next_sensor_) {
       const ChosenTopic& chosen = chosen_[next_sensor_];
@@ -84,7 +115,6 @@ std::optional<Measurement> RecordingSource::next() {
     }
     message_ = reader_->next();
     if (!message_) return std::nullopt;
-    recorded_ = message_->time;
     next_sensor_ = 0;
   }
 }
@@ -114,9 +144,17 @@ std::vector<std::string> RecordingSource::warnings() const {
     if (counts.unstamped > 0) {
       texts.push_back(topic + ": " + plural(counts.unstamped, "message") + " without a stamp: the time of recording is used");
     }
+    // One that was lost, or comes at another moment, is none that lacks.
+    if (counts.unused_parts > counts.used / 20) {
+      texts.push_back(topic + ": " + plural(counts.unused_parts, "message") +
+                      " with a part of the joints not used: the others did not come in time");
+    }
     if (counts.absurd_point_times > 0) {
       texts.push_back(topic + ": " + plural(counts.absurd_point_times, "point") + " dropped, whose time is not within 2 s of the stamp");
     }
+  }
+  for (const Sensor sensor : all_sensors) {
+    if (std::string text = clocks_.finding(sensor); !text.empty()) texts.push_back(std::move(text));
   }
   if (options_.leg_clock) {
     const auto& clock = *options_.leg_clock;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -11,6 +12,7 @@
 
 #include "kilvo/sensors/measurement_source.hpp"
 #include "lab/clocks/leg_clock.hpp"
+#include "lab/clocks/sensor_clocks.hpp"
 #include "lab/messages/point_time.hpp"
 #include "lab/messages/sensor_intake.hpp"
 #include "lab/recordings/recording_reader.hpp"
@@ -25,6 +27,7 @@ struct SensorInput {
   double rate = 0;         // Hz, nominal; 0: unknown. Of the LiDAR it helps to tell the unit of the point times
   double time_offset = 0;  // s, added to the stamps (of a scan: to the time that its points count from)
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();  // of each axis of an IMU
+  JointNames joints = {};                                // that a leg sample must have; messages with a part of them are joined
 };
 
 struct RecordingOptions {
@@ -62,6 +65,8 @@ class RecordingSource final : public MeasurementSource {
   /// How the points' times were found to be written, for the user to read.
   const PointTimeFormat& point_time() const { return point_time_; }
 
+  /// Which sensors stamp by another clock than the IMU.
+  const SensorClocks& clocks() const { return clocks_; }
   /// Of the messages within [start, start + duration).
   const SensorCounts& counts(Sensor s) const { return intakes_[static_cast<std::size_t>(s)].counts(); }
   bool input_damaged() const { return reader_->damage().has_value(); }
@@ -70,7 +75,12 @@ class RecordingSource final : public MeasurementSource {
   std::vector<std::string> warnings() const;
 
  private:
+  struct Held {
+    Measurement measurement;
+    Time recorded;
+  };
   std::optional<Measurement> decode(Sensor sensor, const RawMessage& message);
+  std::optional<Measurement> read();
 
   std::unique_ptr<RecordingReader> reader_;
   RecordingOptions options_;
@@ -79,7 +89,9 @@ class RecordingSource final : public MeasurementSource {
   std::array<SensorIntake, sensor_count> intakes_;
   std::optional<RawMessage> message_;  // read last
   std::size_t next_sensor_ = 0;        // that it has not been decoded for
-  Time recorded_{};
+  Time recorded_{};                    // of the measurement that was given last
+  SensorClocks clocks_;
+  std::deque<Held> held_;  // read, in this order; until the clocks of all sensors that spoke are known
 };
 
 /// Looks at the first clouds of a LiDAR topic. Afterwards the reader must be given its selection again. Throws InputError, naming the

@@ -14,12 +14,13 @@ namespace {
 constexpr double any = std::numeric_limits<double>::infinity();
 
 constexpr Range up_to(double high) { return {0, high, false}; }
+constexpr Range another_epoch{-4e9, 4e9};  // s: from the time since a boot to that since 1970
 constexpr Range above_zero(double high = any) { return {0, high, true}; }
 
 // One line per number. Upper limits are where a mistyped unit or a number that no code was made for begins.
 constexpr std::pair<std::string_view, Range> ranges[] = {
     {"imu.rate", above_zero(100000)},
-    {"imu.time_offset", {-10, 10}},
+    {"imu.time_offset", another_epoch},
     {"imu.accel_range", up_to(10000)},
     {"imu.gyro_range", up_to(1000)},
     {"imu.gyro_scale", {0.5, 2}},
@@ -29,7 +30,7 @@ constexpr std::pair<std::string_view, Range> ranges[] = {
     {"imu.gyro_bias_walk", up_to(1000)},
     {"imu.accel_bias_walk", up_to(10000)},
     {"legs.rate", above_zero(100000)},
-    {"legs.time_offset", {-10, 10}},
+    {"legs.time_offset", another_epoch},
     {"legs.sole_offset", {-1, 1}},
     {"legs.velocity_sigma", {1e-4, 10}},
     {"legs.vertical_velocity_sigma", {1e-4, 10}},
@@ -49,7 +50,7 @@ constexpr std::pair<std::string_view, Range> ranges[] = {
     {"legs.foot_noise", up_to(10)},
     {"legs.foot_noise_vertical", up_to(10)},
     {"lidar.rate", above_zero(1000)},
-    {"lidar.time_offset", {-10, 10}},
+    {"lidar.time_offset", another_epoch},
     {"lidar.min_range", up_to(1000)},
     {"lidar.max_range", above_zero(10000)},
     {"lidar.range_noise", above_zero(10)},
@@ -59,7 +60,7 @@ constexpr std::pair<std::string_view, Range> ranges[] = {
     {"lidar.weak_share", up_to(1)},
     {"lidar.least_ratio", up_to(1)},
     {"camera.rate", above_zero(1000)},
-    {"camera.time_offset", {-10, 10}},
+    {"camera.time_offset", another_epoch},
     {"camera.width", {1, 20000}},
     {"camera.height", {1, 20000}},
     {"camera.fx", above_zero(1000000)},

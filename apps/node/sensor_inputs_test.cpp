@@ -1,0 +1,78 @@
+#include "apps/node/sensor_inputs.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "lab/messages/encode.hpp"
+#include "lab/settings/leg_joints.hpp"
+
+namespace kilvo::node {
+namespace sensor_inputs_test {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+const Time day = time_from_ns(1'700'000'000'000'000'000);
+
+/// A robot's inputs, what comes out of them and what they say.
+struct Live {
+  lab::Settings settings = lab::load_settings(KILVO_SOURCE_DIR "/config/robots/sim.yaml");
+  std::vector<Measurement> out;
+  std::vector<std::string> said;
+  SensorInputs inputs{settings, true, [this](Measurement m, Time) { out.push_back(std::move(m)); },
+                      [this](const std::string& text) { said.push_back(text); }};
+
+  void receive(const Measurement& m, Time at) {
+    const auto bytes = lab::encode(m, "");
+    inputs.receive(sensor_of(m), {lab::written_type(sensor_of(m)).name, {bytes, lab::Encoding::ros1}, at});
+  }
+  int count(Sensor s) const {
+    return static_cast<int>(std::ranges::count_if(out, [s](const Measurement& m) { return sensor_of(m) == s; }));
+  }
+};
+
+/// `seconds` of the IMU at 200 Hz and of each leg in a message of its own, at 500 Hz, stamped `later` than they are.
+void walk(Live& live, double seconds, Duration later, bool both_legs = true) {
+  const JointNames joints = lab::leg_joints(live.settings.robot);
+  const auto middle = joints.begin() + static_cast<std::ptrdiff_t>(joints.size() / 2);
+  const std::array<JointNames, 2> legs{JointNames(JointNames::List(joints.begin(), middle)),
+                                       JointNames(JointNames::List(middle, joints.end()))};
+  for (int ms = 0; ms < 1000 * seconds; ++ms) {
+    const Time t = day + std::chrono::milliseconds(ms), at = t + std::chrono::milliseconds(1);
+    if (ms % 5 == 0) live.receive(ImuSample{t, {0, 0, 0.1}, {0, 0, 9.81}}, at);
+    if (ms % 2 != 0) continue;
+    for (std::size_t i = 0; i < (both_legs ? 2U : 1U); ++i)
+      live.receive(JointSample{t + later, legs[i], std::vector<double>(legs[i].size(), 0.001 * ms), {}, {}}, at);
+  }
+}
+
+TEST(SensorInputs, JoinTheLegsOfTwoMessages) {
+  Live live;
+  walk(live, 1, Duration(0));
+  EXPECT_NEAR(live.count(Sensor::legs), 500, 3);
+  EXPECT_EQ(live.count(Sensor::imu), 200);
+  EXPECT_THAT(live.said, IsEmpty()) << "a part is no fault";
+  EXPECT_EQ(live.inputs.state(Sensor::legs).fault, "");
+  EXPECT_FALSE(live.inputs.state(Sensor::legs).moved);
+}
+
+TEST(SensorInputs, HandOnOneLegThatStaysAloneSoThatTheOtherIsMissed) {
+  Live live;
+  walk(live, 2, Duration(0), false);
+  EXPECT_NEAR(live.count(Sensor::legs), 500, 3) << "after a second of waiting";
+}
+
+TEST(SensorInputs, BringStampsOfAnotherEpochOntoTheImusAndSayItOnce) {
+  Live live;
+  walk(live, 3, -std::chrono::hours(100'000));
+  EXPECT_THAT(live.said, ElementsAre(HasSubstr("legs.time_offset: 360000000.000000")));
+  EXPECT_NEAR(live.count(Sensor::legs), 1000, 10) << "after a second of watching";
+  for (const Measurement& m : live.out) EXPECT_LT(stamp_of(m), day + std::chrono::seconds(3));
+  const InputState legs = live.inputs.state(Sensor::legs);
+  EXPECT_NEAR(legs.moved.value_or(0), 3.6e8, 1e-6);
+  EXPECT_NEAR(static_cast<double>(legs.counts.dropped.at("clock not known yet")), 500, 10);
+}
+
+}  // namespace sensor_inputs_test
+}  // namespace kilvo::node

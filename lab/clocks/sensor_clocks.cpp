@@ -1,0 +1,106 @@
+#include "lab/clocks/sensor_clocks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace kilvo::lab {
+namespace {
+
+// A message cannot come before what it tells. Only the IMU's own delay can make it seem so, and an IMU that comes two seconds late serves
+// no robot. On the other side, what is compressed, queued and sent over a radio may come seconds late, and is late then (the estimator says
+// so); no driver keeps a message for ten seconds.
+constexpr Duration most_early = std::chrono::seconds(2), most_late = std::chrono::seconds(10);
+// Another clock is believed after so long, and so many messages.
+constexpr Duration evidence = std::chrono::seconds(1);
+constexpr std::size_t fewest = 3;
+// Sensors whose clocks seem so near to each other have one and the same: what is between them are their delays. Devices that have
+// been switched on at different times differ by more.
+constexpr Duration one_clock = std::chrono::milliseconds(100);
+// Stamps farther from the arrival are of no clock, s (beyond, differences are no times any more).
+constexpr double absurd = 4.5e9;
+
+bool is_possible(Duration later_than_imu) { return later_than_imu > -most_early && later_than_imu < most_late; }
+
+Time completion_of(const Measurement& m) {
+  const auto* scan = std::get_if<LidarScan>(&m);
+  return scan == nullptr ? stamp_of(m) : end_of(*scan);
+}
+
+struct Delays {
+  Duration usual, least;
+};
+
+// What had waited for the recorder comes with long delays, nine in ten at most; one wrong stamp may make a delay as short as it likes.
+template <class T>
+Delays summary_of(const T& of) {
+  std::vector<Duration> all;
+  all.reserve(of.size());
+  for (const auto& x : of) all.push_back(x.delay);
+  const auto low = all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size() - 1, std::max<std::size_t>(1, all.size() / 10)));
+  std::ranges::nth_element(all, low);
+  Delays out{*low, *low};
+  for (const Duration d : all) {
+    if (out.usual - d < one_clock) out.least = std::min(out.least, d);
+  }
+  return out;
+}
+
+}  // namespace
+
+void SensorClocks::Stream::add(Time arrived, Duration delay) {
+  // Times of arrival that go back are of another recording.
+  if (!delays.empty() && arrived < delays.back().arrived) delays.clear();
+  if (delays.empty()) first = arrived;
+  delays.push_back({arrived, delay});
+  while (delays.size() > fewest && arrived - delays.front().arrived > evidence) delays.pop_front();
+}
+
+void SensorClocks::note(const Measurement& m, Time arrived) {
+  const Sensor sensor = sensor_of(m);
+  Stream& stream = streams_[index_of(sensor)];
+  if (is_given_up_ || stream.is_judged) return;
+  if (std::abs(to_seconds(arrived.time_since_epoch()) - to_seconds(stamp_of(m).time_since_epoch())) > absurd) return;
+  stream.add(arrived, arrived - completion_of(m));
+  for (const Sensor other : all_sensors) {
+    if (!knows(other) && (other == sensor || sensor == Sensor::imu)) judge(other, arrived);
+  }
+}
+
+void SensorClocks::judge(Sensor s, Time arrived) {
+  Stream& stream = streams_[index_of(s)];
+  const Stream& imu = streams_[index_of(Sensor::imu)];
+  if (imu.delays.empty()) return;
+  const Delays its = summary_of(stream.delays), of_imu = summary_of(imu.delays);
+  const bool is_same = is_possible(its.usual - of_imu.usual);
+  const bool is_enough =
+      stream.delays.size() >= fewest && imu.delays.size() >= fewest && arrived - std::max(*stream.first, *imu.first) >= evidence;
+  if (!is_same && !is_enough) return;
+  stream.is_judged = true;
+  stream.delays.clear();
+  if (is_same) return;
+  const Duration set = from_seconds(time_offsets_[index_of(s)]);
+  Duration clock = its.least - of_imu.least + set;
+  // The one with the shortest way tells best.
+  for (const Stream& other : streams_) {
+    if (other.clock && std::chrono::abs(*other.clock - clock) < one_clock) clock = std::min(clock, *other.clock);
+  }
+  stream.clock = clock;
+  // A small setting is the user's, for what times of arrival do not tell; a large one was for other clocks.
+  stream.offset = std::chrono::abs(set) < most_early ? clock : clock - set;
+}
+
+void SensorClocks::correct(Measurement& m) const {
+  if (const auto& by = offset(sensor_of(m))) std::visit([&by](auto& x) { x.t += *by; }, m);
+}
+
+std::string SensorClocks::finding(Sensor s) const {
+  if (!offset(s)) return {};
+  const double by = to_seconds(*offset(s));
+  const std::string name = name_of(s);
+  return name + ": its stamps are of another clock than the IMU's: by the times of arrival they lie " + std::to_string(std::abs(by)) +
+         " s " + (by > 0 ? "before" : "after") + " the IMU's, and are moved by that. Synchronise the clocks; for these data " + name +
+         ".time_offset: " + std::to_string(time_offsets_[index_of(s)] + by) + " does the same";
+}
+
+}  // namespace kilvo::lab

@@ -1,0 +1,66 @@
+// Sensors that stamp by a clock of another epoch than the IMU does: the time since their boot, where others have that of the day.
+//
+// A message arrives a little after what it says was measured, a sweep after its last point. Stamp and arrival are of two clocks, which may
+// differ by anything (a recording that was played and recorded again); but they differ by the same for all sensors that share one clock,
+// but for what each needs on its way. Where a sensor differs from the IMU by more than any way can take, its clock is another one, and
+// its stamps are moved by one constant onto the IMU's: so that its least delay is the IMU's. What jitters in the arrival does not enter. Of
+// several sensors with one such clock the one with the shortest way tells for all.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "kilvo/sensors/measurement.hpp"
+
+namespace kilvo::lab {
+
+class SensorClocks {
+ public:
+  /// `time_offsets`: that the stamps have been given already, s, by Sensor.
+  explicit SensorClocks(const std::array<double, sensor_count>& time_offsets = {}) : time_offsets_(time_offsets) {}
+
+  /// Each measurement in the order of arrival, before it is used.
+  void note(const Measurement& m, Time arrived);
+
+  /// Whether the clock of a sensor is known whose measurement has been noted. Otherwise it has to wait: most sensors are judged by one
+  /// message, those with another clock by a second of them.
+  bool knows(Sensor s) const { return s == Sensor::imu || is_given_up_ || streams_[index_of(s)].is_judged || !streams_[index_of(s)].first; }
+  bool knows_all() const {
+    return std::ranges::all_of(all_sensors, [this](Sensor s) { return knows(s); });
+  }
+
+  /// No more is waited for: sensors that are not judged yet have the IMU's clock.
+  void give_up() { is_given_up_ = true; }
+
+  /// Onto the IMU's clock, of a sensor that is known.
+  void correct(Measurement& m) const;
+
+  /// What is added to the sensor's stamps; nothing where they are of the IMU's clock.
+  const std::optional<Duration>& offset(Sensor s) const { return streams_[index_of(s)].offset; }
+  /// For the user: how far the sensor's clock is from the IMU's, and the setting that does the same. Empty where it is the IMU's.
+  std::string finding(Sensor s) const;
+
+ private:
+  struct Delay {
+    Time arrived;
+    Duration delay;  // from the stamp to the arrival, by two clocks
+  };
+  struct Stream {
+    std::optional<Time> first;  // arrival
+    std::deque<Delay> delays;   // of the last second; of the IMU, and of others until they are judged
+    bool is_judged = false;
+    std::optional<Duration> clock;   // from its own to the IMU's
+    std::optional<Duration> offset;  // that is added: all but what has been set already
+    void add(Time arrived, Duration delay);
+  };
+  void judge(Sensor s, Time arrived);
+
+  std::array<double, sensor_count> time_offsets_;
+  std::array<Stream, sensor_count> streams_;
+  bool is_given_up_ = false;
+};
+
+}  // namespace kilvo::lab

@@ -1,0 +1,219 @@
+#include "lab/clocks/sensor_clocks.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace kilvo::lab {
+namespace sensor_clocks_test {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+const Time day = time_from_ns(1'700'000'000'000'000'000);
+const Duration to_uptime = time_from_ns(1'000'000'000'000) - day;
+
+/// What the sensors measure during `length`, in the order of arrival: IMU at 200 Hz, legs at 500 Hz, sweeps of 100 ms, images at 10 Hz,
+/// each with its own delay and jitter.
+struct Robot {
+  std::array<Duration, sensor_count> clock{};  // added to the stamps
+  std::array<Duration, sensor_count> delay{milliseconds(1), milliseconds(2), milliseconds(12), milliseconds(40)};
+  std::array<Duration, sensor_count> begin{};  // after the first
+  Duration length = seconds(3);
+
+  struct Arrival {
+    Measurement m;
+    Time at, measured;
+  };
+  std::vector<Arrival> arrivals() const {
+    std::vector<Arrival> out;
+    for (const Sensor s : all_sensors) {
+      const std::size_t i = index_of(s);
+      const Duration period = milliseconds(std::array{5, 2, 100, 100}[i]);
+      int n = 0;
+      for (Time t = day + begin[i]; t < day + length; t += period) {
+        const Duration jitter = milliseconds(++n % 4);
+        const Time end = s == Sensor::lidar ? t + milliseconds(99) : t;
+        out.push_back({measurement(s, t + clock[i]), end + delay[i] + jitter, t});
+      }
+    }
+    std::ranges::stable_sort(out, {}, &Arrival::at);
+    return out;
+  }
+  static Measurement measurement(Sensor s, Time t) {
+    switch (s) {
+      case Sensor::imu:
+        return ImuSample{t};
+      case Sensor::legs:
+        return JointSample{t, {}, {0}, {}, {}};
+      case Sensor::lidar:
+        return LidarScan{t, {{1, 0, 0, 0, 0}, {1, 0, 0, 0, 99'000'000}}};
+      case Sensor::camera:
+        break;
+    }
+    return CameraImage{t, {}};
+  }
+};
+
+/// Of all that is given out: the largest difference between a stamp and the time of measurement by the IMU's clock, s; and how many waited.
+struct Result {
+  std::array<double, sensor_count> worst{}, least{};
+  std::array<int, sensor_count> withheld{}, given{};
+};
+
+Result result_of(SensorClocks& clocks, const std::vector<Robot::Arrival>& arrivals, Duration imu_clock) {
+  Result out;
+  for (const auto& a : arrivals) {
+    Measurement m = a.m;
+    const std::size_t i = m.index();
+    clocks.note(m, a.at);
+    if (!clocks.knows(sensor_of(m))) {
+      ++out.withheld[i];
+      continue;
+    }
+    clocks.correct(m);
+    const double error = to_seconds(stamp_of(m) - (a.measured + imu_clock));
+    out.worst[i] = out.given[i] == 0 ? error : std::max(out.worst[i], error);
+    out.least[i] = out.given[i]++ == 0 ? error : std::min(out.least[i], error);
+  }
+  return out;
+}
+
+Result result_of(const Robot& robot) {
+  SensorClocks clocks;
+  return result_of(clocks, robot.arrivals(), robot.clock[0]);
+}
+
+TEST(SensorClocks, OfOneClockNothingIsMovedAndNothingWaits) {
+  for (const Duration all : {Duration(0), to_uptime}) {
+    Robot robot;
+    robot.clock.fill(all);
+    const Result result = result_of(robot);
+    for (std::size_t i = 0; i < sensor_count; ++i) {
+      EXPECT_EQ(result.worst[i], 0);
+      EXPECT_EQ(result.least[i], 0);
+      EXPECT_LE(result.withheld[i], 1);
+    }
+  }
+}
+
+TEST(SensorClocks, AnotherEpochIsMovedByOneConstantToTheDifferenceOfTheDelays) {
+  for (const Duration ahead : {-to_uptime, to_uptime, Duration(seconds(3)), Duration(-seconds(20))}) {
+    Robot robot;
+    robot.clock = {Duration(0), ahead, ahead, ahead};
+    const Result result = result_of(robot);
+    for (std::size_t i = 1; i < sensor_count; ++i) {
+      EXPECT_GT(result.given[i], 10);
+      EXPECT_NEAR(result.worst[i], 0.001, 1e-6) << "the legs have the shortest way, and tell for all";
+      EXPECT_EQ(result.worst[i], result.least[i]) << "no jitter";
+    }
+  }
+}
+
+TEST(SensorClocks, OfSeveralOtherClocksEachIsMovedByItself) {
+  Robot robot;
+  robot.clock = {Duration(0), -to_uptime, to_uptime, to_uptime + seconds(7)};
+  const Result result = result_of(robot);
+  const std::array<double, sensor_count> delay_beyond{0, 0.001, 0.011, 0.039};
+  for (std::size_t i = 1; i < sensor_count; ++i) {
+    EXPECT_NEAR(result.worst[i], delay_beyond[i], 1e-6) << i;
+    EXPECT_EQ(result.worst[i], result.least[i]) << "no jitter";
+  }
+}
+
+TEST(SensorClocks, ADelayOfSecondsAndAClockThatIsSlightlyAheadAreLeftAlone) {
+  for (const Duration by : {Duration(-seconds(3)), Duration(milliseconds(1800))}) {
+    Robot robot;
+    robot.clock[index_of(Sensor::legs)] = by;
+    EXPECT_NEAR(result_of(robot).worst[index_of(Sensor::legs)], to_seconds(by), 1e-9);
+  }
+}
+
+TEST(SensorClocks, TheImuMayComeLaterThanTheOthersAndItsFirstMessagesLate) {
+  for (const bool another : {false, true}) {
+    Robot robot;
+    robot.begin[0] = milliseconds(700);
+    if (another) robot.clock[index_of(Sensor::legs)] = -to_uptime;
+    auto arrivals = robot.arrivals();
+    // What had waited for the recorder: six hundred samples of the IMU come at once, the first of them three seconds late.
+    const Time opened = day + robot.begin[0] + milliseconds(1);
+    std::vector<Robot::Arrival> waited;
+    for (Duration before = seconds(3); before > Duration(0); before -= milliseconds(5))
+      waited.push_back({ImuSample{opened - before}, opened, opened - before});
+    const auto first = std::ranges::find_if(arrivals, [](const auto& a) { return std::holds_alternative<ImuSample>(a.m); });
+    arrivals.insert(first, waited.begin(), waited.end());
+    SensorClocks clocks;
+    const Result result = result_of(clocks, arrivals, Duration(0));
+    EXPECT_EQ(clocks.offset(Sensor::legs).has_value(), another);
+    EXPECT_FALSE(clocks.offset(Sensor::lidar));
+    EXPECT_NEAR(result.worst[1], another ? 0.001 : 0, 1e-6);
+  }
+}
+
+TEST(SensorClocks, OneWrongStampIsOutvoted) {
+  Robot robot;
+  auto arrivals = robot.arrivals();
+  std::array<bool, 2> is_first{true, true};
+  for (auto& a : arrivals) {
+    if (auto* imu = std::get_if<ImuSample>(&a.m); imu != nullptr && std::exchange(is_first[0], false)) imu->t += std::chrono::hours(1);
+    if (auto* scan = std::get_if<LidarScan>(&a.m); scan != nullptr && std::exchange(is_first[1], false)) scan->t -= std::chrono::hours(1);
+  }
+  SensorClocks clocks;
+  result_of(clocks, arrivals, Duration(0));
+  for (const Sensor s : all_sensors) EXPECT_FALSE(clocks.offset(s)) << name_of(s);
+}
+
+TEST(SensorClocks, TimesOfArrivalThatTellNothingChangeNothing) {
+  Robot robot;
+  robot.clock[1] = -to_uptime;
+  for (const bool equal : {true, false}) {
+    auto arrivals = robot.arrivals();
+    for (auto& a : arrivals) a.at = equal ? day : stamp_of(a.m);  // no clock at all; a tool that writes the stamps there
+    SensorClocks clocks;
+    result_of(clocks, arrivals, Duration(0));
+    EXPECT_FALSE(clocks.offset(Sensor::legs));
+  }
+}
+
+TEST(SensorClocks, ASensorThatComesLateIsJudgedByTheImuOfThen) {
+  for (const Duration clock : {Duration(0), -to_uptime}) {
+    Robot robot;
+    robot.length = seconds(40);
+    robot.begin[index_of(Sensor::camera)] = seconds(35);
+    robot.clock[index_of(Sensor::camera)] = clock;
+    auto arrivals = robot.arrivals();
+    for (auto& a : arrivals) a.at += (a.at - day);  // played at half the speed, and recorded again
+    SensorClocks clocks;
+    result_of(clocks, arrivals, Duration(0));
+    EXPECT_EQ(clocks.offset(Sensor::camera).has_value(), clock != Duration(0));
+    EXPECT_FALSE(clocks.offset(Sensor::legs));
+    EXPECT_FALSE(clocks.offset(Sensor::lidar));
+  }
+}
+
+TEST(SensorClocks, ASmallSettingIsAddedAndALargeOneIsOfOtherClocks) {
+  Robot robot;
+  robot.clock[1] = -to_uptime;
+  for (const double set : {0.0, 0.004, 12345.0}) {
+    auto arrivals = robot.arrivals();
+    for (auto& a : arrivals) {
+      if (auto* joints = std::get_if<JointSample>(&a.m)) joints->t += from_seconds(set);
+    }
+    SensorClocks clocks({0, set, 0, 0});
+    const Result result = result_of(clocks, arrivals, Duration(0));
+    EXPECT_NEAR(result.worst[1], set < 1 ? 0.001 + set : 0.001, 2e-6);
+    EXPECT_THAT(clocks.finding(Sensor::legs),
+                ::testing::HasSubstr("legs: its stamps are of another clock than the IMU's: by the times of"));
+    EXPECT_THAT(clocks.finding(Sensor::legs), ::testing::HasSubstr("legs.time_offset: -1699998999.99"));
+    EXPECT_EQ(clocks.finding(Sensor::camera), "");
+  }
+  SensorClocks mended({0, to_seconds(to_uptime), 0, 0});
+  auto arrivals = robot.arrivals();
+  for (auto& a : arrivals) {
+    if (auto* joints = std::get_if<JointSample>(&a.m)) joints->t += to_uptime;
+  }
+  result_of(mended, arrivals, Duration(0));
+  EXPECT_FALSE(mended.offset(Sensor::legs));
+}
+
+}  // namespace sensor_clocks_test
+}  // namespace kilvo::lab
