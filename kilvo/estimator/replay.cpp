@@ -150,6 +150,7 @@ ImuSample Replay::imu_at(Time t) const {
 }
 
 LegModel::Used Replay::apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept) const {
+  if (step.false_velocity) e.P.block<3, 3>(at::v, at::v) += *step.false_velocity * step.false_velocity->transpose();
   if (step.rise) {
     const Eigen::Vector3d wrong = *step.rise * e.x.g.normalized();
     e.P.block<3, 3>(at::v, at::v) += wrong * wrong.transpose();

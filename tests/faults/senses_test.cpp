@@ -109,6 +109,21 @@ TEST_F(Senses, ABurstOfWrongAccelerationsIsOutlivedWithSweeps) {
   }
 }
 
+// Both soles are then faster than a foot that swings, and no robot walks so.
+TEST_F(Senses, OnTheLegsAVelocityThatNoFootHasIsCorrected) {
+  for (const double accel : {20.0, -20.0}) {
+    for (const int axis : {0, 1}) {
+      const auto hit = [accel, axis](Measurement& m, double s) {
+        if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && s >= 8 && s < 8.2) imu->accel[axis] += accel;
+        return true;
+      };
+      const Outcome o = walk_->with({}, {ki, hit, {}});
+      std::printf("%.0f m/s^2 along %d: %.3f m at the end\n", accel, axis, o.worst(&Moment::error, 13, 14));
+      EXPECT_LT(o.worst(&Moment::error, 13, 14), 0.5);
+    }
+  }
+}
+
 // Two samples that no IMU measures; and two of what one might, which make a velocity that nobody has.
 TEST_F(Senses, OnTheLegsAWrongAccelerationLeavesAnHonestEstimate) {
   for (const auto& [samples, accel] : {std::pair(2, 4000.0), std::pair(2, 900.0)}) {
