@@ -12,6 +12,8 @@ namespace kilvo {
 
 class PredictionCheck {
  public:
+  static constexpr int remembered = 50;  // sweeps
+
   /// It was registered much farther from `prior` than the covariance says and than sweeps usually are: the first one of its kind after some
   /// that were not, as after a push, or one more, which is none. `map_error`: of the map around the prior. To be asked once a sweep;
   /// one that `rejoins` the map may be anywhere.
@@ -19,8 +21,6 @@ class PredictionCheck {
   Surprise surprise(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error, bool rejoins);
   /// It fits nowhere, or of what meets a surface a tenth more than usual lies beside it.
   bool contradicts(const Registration& sweep) const;
-  /// The sweep before contradicted the prediction, whatever was tried.
-  bool was_contradicted() const { return contradicted_sweeps_ > 0; }
   /// No pose near by explains it, and one farther away may: the sweeps before may have been smeared. In a crowd there is none, and the more
   /// sweeps were not explained, the less often a search is worth its time.
   bool is_to_be_searched_for() const { return std::has_single_bit(contradicted_sweeps_ + 1); }
@@ -56,8 +56,8 @@ class PredictionCheck {
   void learn(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
 
  private:
-  static constexpr int enough = 5, remembered = 50;  // sweeps
-  static constexpr double too_often = 5;             // contradictions of late, about one in ten sweeps: no IMU changes so often
+  static constexpr int enough = 5;        // sweeps
+  static constexpr double too_often = 5;  // contradictions of late, about one in ten sweeps: no IMU changes so often
 
   bool lies_beside(const RegistrationReport& report) const;
   bool is_unusual(double change) const;

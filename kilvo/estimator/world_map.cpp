@@ -59,8 +59,19 @@ Registration WorldMap::measure_near(LidarPipeline& lidar, const Sweep& sweep, co
   return measure(lidar, sweep, history, prior, counted);
 }
 
+WorldMap::Motion WorldMap::motion_between(const State& base, const State& prior) {
+  const auto change = boxminus(prior, base);
+  return {change.segment<3>(at::R).squaredNorm(), change.segment<3>(at::v).squaredNorm()};
+}
+
+bool WorldMap::is_violent(const Motion& motion) const {
+  // Three times as much.
+  return motion.turned2 > 9 * usual_motion_.turned2 || motion.pushed2 > 9 * usual_motion_.pushed2;
+}
+
 bool WorldMap::agrees(const Estimate& prior, const Registration& sweep) const {
-  return !sweep.refused && LidarPipeline::squared_change(prior, sweep, error_at(prior.x.pose())) < LidarPipeline::agreeing_change;
+  return !sweep.refused && sweep.carries &&
+         LidarPipeline::squared_change(prior, sweep, error_at(prior.x.pose())) < LidarPipeline::agreeing_change;
 }
 
 std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior,
@@ -69,31 +80,36 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
   const auto explains = [&](const Registration& again) {
     return is_contradicted ? prediction_.explains(again, out) : again.carries && !again.refused;
   };
-  const auto on_surfaces = [](const Registration& r) { return static_cast<double>(r.report.matched) / std::max(1, r.report.clusters); };
-  constexpr double clearly = 1.03;  // times as many
-  std::optional<Attempt> best;
-  bool is_another = false;
-  const auto consider = [&](std::optional<History> other) {
-    if (!other) return false;
+  const auto try_with = [&](std::optional<History> other) -> std::optional<Attempt> {
+    if (!other) return std::nullopt;
     Attempt again = attempt(lidar, sweep, std::move(*other), prior.t);
-    if (!(is_contradicted ? explains(again.sweep) : agrees(again.prior, again.sweep))) return false;
-    if (best && on_surfaces(again.sweep) < clearly * on_surfaces(best->sweep)) return false;
-    best = std::move(again);
-    return true;
+    if (!(is_contradicted ? explains(again.sweep) : agrees(again.prior, again.sweep))) return std::nullopt;
+    return again;
   };
-  if (!out.searched) {
+  const auto on_surfaces = [](const Attempt& a) {
+    return static_cast<double>(a.sweep.report.matched) / std::max(1, a.sweep.report.clusters);
+  };
+  std::optional<Attempt> best, moved;
+  if (!out.searched && (!out.refused || searches)) {
     Registration near = measure_near(lidar, sweep, history, prior, PredictionCheck::released(prior));
     if (searches && !explains(near)) near = measure_near(lidar, sweep, history, prior, PredictionCheck::lost(prior));
     const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
-    if (explains(near) && consider(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs()))) prediction_.begin(prior.t, off);
-    if (explains(near) && is_contradicted) is_another = consider(history.moved(off.turned, off.moved));
+    if (explains(near)) best = try_with(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs()));
+    if (is_contradicted && explains(near) && !agrees(prior, out) && !PredictionCheck::is_small(off))
+      moved = try_with(history.moved(off.turned, off.moved));
+    constexpr double clearly = 1.03;  // times as many
+    if (moved && best && on_surfaces(*moved) < clearly * on_surfaces(*best)) moved.reset();
+    if (best && !moved) return prediction_.begin(prior.t, off), best;
   }
-  if (searches) {
-    const Replay& samples = history.replay();
-    for (const auto& rate : {std::optional<Eigen::Vector3d>(), samples.gyro_at(history.base().t), std::optional(samples.mean_gyro())})
-      is_another |= consider(history.doubted(sweep.end, rate));
+  // Samples are wrong only where no other pose explains the sweep, and where it is somewhere else without them.
+  best = std::move(moved);
+  const Replay& samples = history.replay();
+  for (const auto& rate : {std::optional<Eigen::Vector3d>(), samples.gyro_at(history.base().t), std::optional(samples.mean_gyro())}) {
+    if (best || !searches || !is_violent(motion_between(history.base().x, prior.x))) break;
+    best = try_with(history.doubted(sweep.end, rate));
+    if (best && !out.refused && PredictionCheck::is_small(PredictionCheck::error_between(prior.x, best->sweep.posterior.x))) best.reset();
   }
-  if (best) best->sweep.unpredicted = is_another;
+  if (best) best->sweep.unpredicted = true;
   return best;
 }
 
@@ -116,23 +132,29 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, 
   if (!out.carries) out = measure(lidar, sweep, history, prior, drops);
   const auto surprise = prediction_.surprise(prior, out, error_at(prior.x.pose()), lidar.is_rejoining());
   const bool is_contradicted = prediction_.contradicts(out);
-  // Beside surfaces at a pose that is not where it was predicted, or right after a sweep that was: the pose is not known.
-  const bool is_lost = is_contradicted && (out.refused || !agrees(prior, out) || (lidar.is_rejoining() && prediction_.was_contradicted()));
+  // Beside surfaces, and not where it was predicted: in a crowd it would be.
+  const bool is_lost =
+      is_contradicted && !agrees(prior, out) && !PredictionCheck::is_small(PredictionCheck::error_between(prior.x, out.posterior.x));
   std::optional<Attempt> other;
   if (is_contradicted || surprise == PredictionCheck::Surprise::again) {
     other = explain(lidar, sweep, history, prior, out);
   } else if (surprise == PredictionCheck::Surprise::first) {
     if (auto pushed = history.loosened(prior.t, 0, (out.posterior.x.p - prior.x.p).norm(), false)) {
       other = attempt(lidar, sweep, std::move(*pushed), prior.t);
-      if (!other->sweep.carries || !agrees(other->prior, other->sweep)) other.reset();
+      if (!agrees(other->prior, other->sweep)) other.reset();
     }
   }
   if (other) {
     go_on_with(std::move(*other));
-  } else if (is_lost && !out.refused) {
+  } else if (is_lost) {
     out.refused = Reason::fits_nowhere;
     out.carries = false;
     out.posterior = prior;
+  }
+  if (!is_contradicted && out.carries) {
+    const Motion motion = motion_between(history.base().x, predicted.x);
+    usual_motion_.turned2 += (motion.turned2 - usual_motion_.turned2) / PredictionCheck::remembered;
+    usual_motion_.pushed2 += (motion.pushed2 - usual_motion_.pushed2) / PredictionCheck::remembered;
   }
   prediction_.learn(predicted, out, error_at(predicted.x.pose()));
   return out;

@@ -59,6 +59,10 @@ class WorldMap {
     PointDrops drops;
   };
 
+  struct Motion {
+    double turned2 = 0, pushed2 = 0;  // squared, rad and m/s
+  };
+
   Registration measure(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior, PointDrops& drops) const;
   /// As another history predicts it.
   Attempt attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops drops = {}) const;
@@ -66,6 +70,9 @@ class WorldMap {
   /// one that the IMU has not moved to, or samples that are wrong. The best of those that explain it.
   std::optional<Attempt> explain(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior,
                                  const Registration& out);
+  static Motion motion_between(const State& base, const State& prior);
+  /// The samples of the IMU predict more motion since the last sweep than is usual, as ones do that are wrong.
+  bool is_violent(const Motion& motion) const;
   bool agrees(const Estimate& prior, const Registration& sweep) const;
   /// From where it is found from `released`, with the gate of the prior: that of an uncertain one lets almost everything lie on the
   /// surfaces.
@@ -78,6 +85,7 @@ class WorldMap {
   VoxelMap surfaces_;
   MapError error_;
   PredictionCheck prediction_;
+  Motion usual_motion_;  // between sweeps, as the IMU predicts it: means of the last seconds
   bool is_given_ = false;
 };
 

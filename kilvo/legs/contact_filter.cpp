@@ -54,10 +54,6 @@ void ContactFilter::restart() {
 double ContactFilter::stance_speed() const { return std::exp(speeds_of(stance_, swing_).stance); }
 double ContactFilter::swing_speed() const { return std::exp(speeds_of(stance_, swing_).swing); }
 double ContactFilter::threshold_speed() const { return std::sqrt(stance_speed() * swing_speed()); }
-double ContactFilter::fast_swing() const {
-  const Speeds s = speeds_of(stance_, swing_);
-  return std::exp(s.swing + 2 * s.swing_sigma);
-}
 double ContactFilter::fast_stance() const {
   const Speeds s = speeds_of(stance_, swing_);
   return std::exp(s.stance + s.stance_sigma);

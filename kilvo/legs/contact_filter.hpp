@@ -43,7 +43,6 @@ class ContactFilter {
   double swing_speed() const;
   double threshold_speed() const;
   /// A supporting foot is slower than this for five samples out of six.
-  double fast_swing() const;
   double fast_stance() const;
 
   /// Of the weight, on the left foot while both stand: where the line of force lies between where it usually is on either.

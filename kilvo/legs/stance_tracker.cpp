@@ -233,10 +233,11 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     foot.variance_scale = std::min(lighter * loose / contacts.probability[side], largest_scale * largest_scale);
   }
   out.rise = noise_.take_rise();
-  if (support.on_legs_alone && !contacts.flight && contacts.fast_swing > 0) {
+  // Both soles three times as fast as one that swings: the state's velocity is wrong, for samples of the IMU that were.
+  if (support.on_legs_alone && !contacts.flight && contacts.swing_speed > 0) {
     const Eigen::Vector3d left = slowest_of(feet.foot[0], x, omega), right = slowest_of(feet.foot[1], x, omega);
     const Eigen::Vector3d& slower = left.squaredNorm() < right.squaredNorm() ? left : right;
-    if (slower.norm() > contacts.fast_swing) out.false_velocity = slower;
+    if (slower.norm() > 3 * contacts.swing_speed) out.false_velocity = slower;
   }
   return out;
 }
