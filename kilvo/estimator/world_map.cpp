@@ -74,6 +74,10 @@ bool WorldMap::agrees(const Estimate& prior, const Registration& sweep) const {
          LidarPipeline::squared_change(prior, sweep, error_at(prior.x.pose())) < LidarPipeline::agreeing_change;
 }
 
+bool WorldMap::is_lost(const Estimate& prior, const Registration& sweep) const {
+  return !agrees(prior, sweep) && (sweep.refused || !PredictionCheck::is_small(PredictionCheck::error_between(prior.x, sweep.posterior.x)));
+}
+
 std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior,
                                                    const Registration& out) {
   const bool is_contradicted = prediction_.contradicts(out), searches = is_contradicted && prediction_.is_to_be_searched_for();
@@ -105,7 +109,7 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
   best = std::move(moved);
   const Replay& samples = history.replay();
   for (const auto& rate : {std::optional<Eigen::Vector3d>(), samples.gyro_at(history.base().t), std::optional(samples.mean_gyro())}) {
-    if (best || !searches || !is_violent(motion_between(history.base().x, prior.x))) break;
+    if (best || !searches || !(is_lost(prior, out) || is_violent(motion_between(history.base().x, prior.x)))) break;
     best = try_with(history.doubted(sweep.end, rate));
     if (best && !out.refused && PredictionCheck::is_small(PredictionCheck::error_between(prior.x, best->sweep.posterior.x))) best.reset();
   }
@@ -132,9 +136,6 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, 
   if (!out.carries) out = measure(lidar, sweep, history, prior, drops);
   const auto surprise = prediction_.surprise(prior, out, error_at(prior.x.pose()), lidar.is_rejoining());
   const bool is_contradicted = prediction_.contradicts(out);
-  // Beside surfaces, and not where it was predicted: in a crowd it would be.
-  const bool is_lost =
-      is_contradicted && !agrees(prior, out) && !PredictionCheck::is_small(PredictionCheck::error_between(prior.x, out.posterior.x));
   std::optional<Attempt> other;
   if (is_contradicted || surprise == PredictionCheck::Surprise::again) {
     other = explain(lidar, sweep, history, prior, out);
@@ -146,7 +147,7 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, 
   }
   if (other) {
     go_on_with(std::move(*other));
-  } else if (is_lost) {
+  } else if (is_contradicted && !out.refused && is_lost(prior, out)) {
     out.refused = Reason::fits_nowhere;
     out.carries = false;
     out.posterior = prior;

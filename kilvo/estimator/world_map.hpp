@@ -73,6 +73,8 @@ class WorldMap {
   static Motion motion_between(const State& base, const State& prior);
   /// The samples of the IMU predict more motion since the last sweep than is usual, as ones do that are wrong.
   bool is_violent(const Motion& motion) const;
+  /// It fits nowhere, or is not where it was predicted: in a crowd it would be.
+  bool is_lost(const Estimate& prior, const Registration& sweep) const;
   bool agrees(const Estimate& prior, const Registration& sweep) const;
   /// From where it is found from `released`, with the gate of the prior: that of an uncertain one lets almost everything lie on the
   /// surfaces.
