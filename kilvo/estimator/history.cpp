@@ -39,19 +39,28 @@ Estimate History::record_from(const Estimate& e, Time until) {
   return ahead;
 }
 
-std::optional<History> History::doubted(Time end) const {
-  if (end - base_.t > longest_correction) return std::nullopt;
+std::optional<History> History::doubted(Time end, const std::optional<Eigen::Vector3d>& rate) const {
+  if (to_seconds(end - base_.t) > longest_doubt) return std::nullopt;
   std::optional<History> out(*this);
-  out->replay_.doubt_acceleration(base_);
+  out->replay_.doubt_samples(base_, rate);
+  out->correct_trajectory(base_, Eigen::Vector3d::Zero());  // nothing after it
+  return out;
+}
+
+History History::moved(double turned, double moved) const {
+  History out(*this);
+  out.base_.P.diagonal().segment<3>(at::R).array() += turned * turned;
+  out.base_.P.diagonal().segment<3>(at::p).array() += moved * moved;
+  out.replay_.forget_estimates();
   return out;
 }
 
 std::optional<History> History::loosened(Time middle, double turned, double moved, bool biases) const {
   // It may have begun before the base, if that is an image: since the last sweep.
   const double before = swept_ ? std::max(0.0, to_seconds(base_.t - *swept_)) : 0;
-  constexpr double shortest = 0.01, longest = 1.5, noticed = 0.1;  // s; between sweeps, and how soon a bias is found
+  constexpr double shortest = 0.01, noticed = 0.1;  // s; between sweeps, and how soon a bias is found
   const double told = before + to_seconds(middle - base_.t), since = std::max(told, shortest);
-  if (!(told > 0) || told > longest) return std::nullopt;
+  if (!(told > 0) || told > longest_doubt) return std::nullopt;
   std::optional<History> out(*this);
   Covariance& P = out->base_.P;
   const double velocity = moved / since;

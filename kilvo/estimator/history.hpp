@@ -32,9 +32,11 @@ class History {
 
   /// The estimate of a time not before the base. The poses up to then are in the trajectory.
   Estimate at(Time t) { return record_from(base_, t); }
-  /// For a sweep until `end`: a history that does not trust the accelerometer since the base. None when that is too long ago. now() and
-  /// closed() stay.
-  std::optional<History> doubted(Time end) const;
+  /// For a sweep until `end`: a history that does not trust the accelerometer since the base, nor the gyro if the robot is to have turned
+  /// at `rate`, rad/s, instead. None when that is too long ago. now() and closed() stay.
+  std::optional<History> doubted(Time end, const std::optional<Eigen::Vector3d>& rate) const;
+  /// A history in which the pose at the base may be off by so much, rad and m, and nothing else. now() and closed() stay.
+  History moved(double turned, double moved) const;
   /// A history in which the pose that is predicted from the last sweep to `middle` may be off by so much, rad and m, and the rates since
   /// then with it; if `biases` are doubted, those of the IMU may have become others. None when that sweep is more than 1.5 s ago. now() and
   /// closed() stay.
@@ -96,6 +98,7 @@ class History {
 
  private:
   static constexpr Duration longest_correction = std::chrono::milliseconds(300);  // of what is past
+  static constexpr double longest_doubt = 1.5;                                    // s, since the last sweep
 
   Trajectory* record() { return is_fork_ ? nullptr : &trajectory_; }
 

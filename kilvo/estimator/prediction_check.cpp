@@ -24,11 +24,14 @@ bool measures(const Registration& sweep) { return !sweep.refused && sweep.carrie
 
 }  // namespace
 
-bool PredictionCheck::contradicts(const Registration& sweep) const {
-  constexpr int told_apart = 10;                  // sweeps
+bool PredictionCheck::lies_beside(const RegistrationReport& report) const {
   constexpr double clearly = 0.1, by_chance = 4;  // -, standard deviations
-  if (gives_up() || sweeps_ < told_apart || sweep.refused || sweep.searched || met(sweep.report) == 0) return false;
-  return share_beside(sweep.report) > share_ + std::max(clearly, by_chance * std::sqrt(share_ * (1 - share_) / met(sweep.report)));
+  return share_beside(report) > share_ + std::max(clearly, by_chance * std::sqrt(share_ * (1 - share_) / met(report)));
+}
+
+bool PredictionCheck::contradicts(const Registration& sweep) const {
+  if (sweep.refused) return sweep.refused == Reason::fits_nowhere;
+  return !gives_up() && sweeps_ >= 2 * enough && !sweep.searched && met(sweep.report) > 0 && lies_beside(sweep.report);
 }
 
 bool PredictionCheck::is_unusual(double change) const {
@@ -58,13 +61,18 @@ Estimate PredictionCheck::released(const Estimate& prior) { return inflated(prio
 Estimate PredictionCheck::lost(const Estimate& prior) { return inflated(prior, 3); }
 
 bool PredictionCheck::explains(const Registration& again, const Registration& sweep) const {
-  const double left = share_beside(again.report) - share_, before = share_beside(sweep.report) - share_;
-  return !again.refused && again.carries && left < 0.5 * before && again.report.matched > sweep.report.matched;
+  if (again.refused || !again.carries || again.report.matched <= sweep.report.matched || lies_beside(again.report)) return false;
+  return sweep.refused || share_beside(again.report) - share_ < 0.5 * (share_beside(sweep.report) - share_);
 }
 
 PredictionCheck::Error PredictionCheck::error_between(const State& predicted, const State& found) {
   const Eigen::Matrix<double, 6, 1> change = boxminus(found, predicted).head<6>();
   return {change.head<3>().norm(), change.tail<3>().norm()};
+}
+
+bool PredictionCheck::is_small(const Error& off) {
+  constexpr double small = 0.3;  // of what the nearest planes bear
+  return off.turned < small * well_known_rotation && off.moved < small * well_known_position;
 }
 
 void PredictionCheck::begin(Time t, const Error& off) {
@@ -84,8 +92,12 @@ void PredictionCheck::begin(Time t, const Error& off) {
 }
 
 void PredictionCheck::learn(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error) {
+  if (contradicts(sweep)) {
+    ++contradicted_sweeps_;
+  } else if (measures(sweep)) {
+    contradicted_sweeps_ = 0;
+  }
   if (!measures(sweep)) return;
-  contradicted_sweeps_ = contradicts(sweep) ? contradicted_sweeps_ + 1 : 0;
   if (error_) {
     ++sweeps_with_error_;
     lasted_ = sweep.posterior.t - since_;
@@ -101,9 +113,7 @@ void PredictionCheck::learn(const Estimate& prior, const Registration& sweep, co
     doubted_sweeps_ = std::min(doubted_sweeps_ + 1, remembered);
     unusual_share_ += ((out ? 1 : 0) - unusual_share_) / doubted_sweeps_;
     // A prior that is uncertain for the doubt before agrees with anything.
-    constexpr double near = 0.3;  // of what the nearest planes bear
-    const bool is_near = off.turned < near * well_known_rotation && off.moved < near * well_known_position;
-    agreeing_sweeps_ = out || !is_near ? 0 : agreeing_sweeps_ + 1;
+    agreeing_sweeps_ = out || !is_small(off) ? 0 : agreeing_sweeps_ + 1;
     if (agreeing_sweeps_ >= (recurred_ ? remembered : enough)) error_.reset();
   }
   if (sweep.searched) return;

@@ -12,12 +12,14 @@ namespace kilvo {
 
 class PredictionCheck {
  public:
+  static constexpr int remembered = 50;  // sweeps
+
   /// It was registered much farther from `prior` than the covariance says and than sweeps usually are: the first one of its kind after some
   /// that were not, as after a push, or one more, which is none. `map_error`: of the map around the prior. To be asked once a sweep;
   /// one that `rejoins` the map may be anywhere.
   enum class Surprise : std::uint8_t { none, first, again };
   Surprise surprise(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error, bool rejoins);
-  /// Of what meets a surface a tenth more than usual lies beside it.
+  /// It fits nowhere, or of what meets a surface a tenth more than usual lies beside it.
   bool contradicts(const Registration& sweep) const;
   /// No pose near by explains it, and one farther away may: the sweeps before may have been smeared. In a crowd there is none, and the more
   /// sweeps were not explained, the less often a search is worth its time.
@@ -34,6 +36,8 @@ class PredictionCheck {
     double turned = 0, moved = 0;
   };
   static Error error_between(const State& predicted, const State& found);
+  /// That of a prediction that may be right.
+  static bool is_small(const Error& off);
   /// The prediction at `t` was off by this: those that follow may be as well.
   void begin(Time t, const Error& off);
   /// Of the predictions now, as the last sweeps show it; none while they are right.
@@ -52,9 +56,10 @@ class PredictionCheck {
   void learn(const Estimate& prior, const Registration& sweep, const PoseCovariance& map_error);
 
  private:
-  static constexpr int enough = 5, remembered = 50;  // sweeps
-  static constexpr double too_often = 5;             // contradictions of late, about one in ten sweeps: no IMU changes so often
+  static constexpr int enough = 5;        // sweeps
+  static constexpr double too_often = 5;  // contradictions of late, about one in ten sweeps: no IMU changes so often
 
+  bool lies_beside(const RegistrationReport& report) const;
   bool is_unusual(double change) const;
 
   int sweeps_ = 0;                    // that were learnt from, at most `remembered`

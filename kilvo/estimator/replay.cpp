@@ -150,6 +150,7 @@ ImuSample Replay::imu_at(Time t) const {
 }
 
 LegModel::Used Replay::apply(Estimate& e, const LegStep& step, Gain<LegModel::max_leg_rows>* kept) const {
+  if (step.false_velocity) e.P.block<3, 3>(at::v, at::v) += *step.false_velocity * step.false_velocity->transpose();
   if (step.rise) {
     const Eigen::Vector3d wrong = *step.rise * e.x.g.normalized();
     e.P.block<3, 3>(at::v, at::v) += wrong * wrong.transpose();
@@ -260,13 +261,16 @@ const Estimate& Replay::nearest(Time t, const Estimate& oldest) const {
   return after == remembered_.begin() ? oldest : *(after - 1);
 }
 
-void Replay::doubt_acceleration(const Estimate& base) {
+void Replay::doubt_samples(const Estimate& base, const std::optional<Eigen::Vector3d>& rate) {
   forget_estimates();
   usual_.accel_density2 = usual_.accel_bend2 = 0;  // they were of what is wrong
   for (ImuSample& s : imu_) {
     if (s.t <= base.t) continue;
     s.accel = base.x.ba - base.x.R.inverse() * base.x.g;
     s.accel_clipped = true;
+    if (!rate) continue;
+    s.gyro = *rate;
+    s.gyro_clipped = true;
   }
 }
 

@@ -1,8 +1,10 @@
 // The sequential phase: sweeps and images update the state at their own times; what came since is propagated again.
 #include <algorithm>
+#include <numbers>
 
 #include "kilvo/estimator/estimator.hpp"
 #include "kilvo/filter/gap.hpp"
+#include "kilvo/math/decimals.hpp"
 #include "kilvo/math/stopwatch.hpp"
 
 namespace kilvo {
@@ -23,7 +25,15 @@ std::optional<Eigen::Vector3d> direction_of(const PoseCovariance& part) {
   return position.col(most).normalized();
 }
 
-void judge(const PredictionCheck& check, const Findings::Situation& now, Findings& findings) {
+// `expected`: before the sweep.
+void judge(const PredictionCheck& check, const State& expected, const Registration& sweep, const Findings::Situation& now,
+           Findings& findings) {
+  findings.statistics().searches += sweep.searched ? 1 : 0;
+  findings.statistics().found += sweep.searched && !sweep.refused ? 1 : 0;
+  const auto off = PredictionCheck::error_between(expected, sweep.posterior.x);
+  if (sweep.unpredicted && !PredictionCheck::is_small(off))
+    findings.report(now, Sensor::lidar, Reason::not_where_predicted, off.moved,
+                    decimals(off.moved, 2) + " m and " + decimals(off.turned * 180 / std::numbers::pi, 1) + " degrees");
   if (!check.lasts() && (!check.is_hopeless() || findings.statistics().diverged)) return;
   findings.contradict(check.is_hopeless() ? Reason::diverged : Reason::inconsistent, Sensor::imu, Sensor::lidar,
                       check.error().value_or(PredictionCheck::Error{}).moved,
@@ -53,13 +63,11 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   Estimate prior = history_.at(middle);
   history_.record_from(prior, end);
   if (!lidar_.has_shape(end, prior)) return findings_.drop(Sensor::lidar, Reason::before_motion);
-  Statistics& statistics = findings_.statistics();
   const bool first = map_.surfaces().empty(), without_legs = !status_.has_legs();
-  const Registration sweep =
-      map_.register_sweep(lidar_, {scan, end, without_legs, legs_.description_error(prior.x)}, history_, prior, statistics.points);
-  judge(map_.prediction(), situation(), findings_);
-  statistics.searches += sweep.searched ? 1 : 0;
-  statistics.found += sweep.searched && !sweep.refused ? 1 : 0;
+  const State expected = prior.x;
+  const Registration sweep = map_.register_sweep(lidar_, {scan, end, without_legs, legs_.description_error(prior.x)}, history_, prior,
+                                                 findings_.statistics().points);
+  judge(map_.prediction(), expected, sweep, situation(), findings_);
   if (sweep.refused) {
     findings_.drop(Sensor::lidar, *sweep.refused);
     if (sweep.refused != Reason::fits_nowhere) return;

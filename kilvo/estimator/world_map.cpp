@@ -45,11 +45,11 @@ Registration WorldMap::measure(LidarPipeline& lidar, const Sweep& sweep, const H
   return out;
 }
 
-WorldMap::Attempt WorldMap::attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops& drops) const {
+WorldMap::Attempt WorldMap::attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops drops) const {
   const Estimate prior = history.at(middle);
   history.record_from(prior, sweep.end);
   Registration found = measure(lidar, sweep, history, prior, drops);
-  return {std::move(history), prior, std::move(found)};
+  return {std::move(history), prior, std::move(found), drops};
 }
 
 Registration WorldMap::measure_near(LidarPipeline& lidar, const Sweep& sweep, const History& history, Estimate prior,
@@ -57,6 +57,64 @@ Registration WorldMap::measure_near(LidarPipeline& lidar, const Sweep& sweep, co
   PointDrops counted;
   prior.x = measure(lidar, sweep, history, released, counted).posterior.x;
   return measure(lidar, sweep, history, prior, counted);
+}
+
+WorldMap::Motion WorldMap::motion_between(const State& base, const State& prior) {
+  const auto change = boxminus(prior, base);
+  return {change.segment<3>(at::R).squaredNorm(), change.segment<3>(at::v).squaredNorm()};
+}
+
+bool WorldMap::is_violent(const Motion& motion) const {
+  // Three times as much.
+  return motion.turned2 > 9 * usual_motion_.turned2 || motion.pushed2 > 9 * usual_motion_.pushed2;
+}
+
+bool WorldMap::agrees(const Estimate& prior, const Registration& sweep) const {
+  return !sweep.refused && sweep.carries &&
+         LidarPipeline::squared_change(prior, sweep, error_at(prior.x.pose())) < LidarPipeline::agreeing_change;
+}
+
+bool WorldMap::is_lost(const Estimate& prior, const Registration& sweep) const {
+  return !agrees(prior, sweep) && (sweep.refused || !PredictionCheck::is_small(PredictionCheck::error_between(prior.x, sweep.posterior.x)));
+}
+
+std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior,
+                                                   const Registration& out) {
+  const bool is_contradicted = prediction_.contradicts(out), searches = is_contradicted && prediction_.is_to_be_searched_for();
+  const auto explains = [&](const Registration& again) {
+    return is_contradicted ? prediction_.explains(again, out) : again.carries && !again.refused;
+  };
+  const auto try_with = [&](std::optional<History> other) -> std::optional<Attempt> {
+    if (!other) return std::nullopt;
+    Attempt again = attempt(lidar, sweep, std::move(*other), prior.t);
+    if (!(is_contradicted ? explains(again.sweep) : agrees(again.prior, again.sweep))) return std::nullopt;
+    return again;
+  };
+  const auto on_surfaces = [](const Attempt& a) {
+    return static_cast<double>(a.sweep.report.matched) / std::max(1, a.sweep.report.clusters);
+  };
+  std::optional<Attempt> best, moved;
+  if (!out.searched && (!out.refused || searches)) {
+    Registration near = measure_near(lidar, sweep, history, prior, PredictionCheck::released(prior));
+    if (searches && !explains(near)) near = measure_near(lidar, sweep, history, prior, PredictionCheck::lost(prior));
+    const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
+    if (explains(near)) best = try_with(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs()));
+    if (is_contradicted && explains(near) && !agrees(prior, out) && !PredictionCheck::is_small(off))
+      moved = try_with(history.moved(off.turned, off.moved));
+    constexpr double clearly = 1.03;  // times as many
+    if (moved && best && on_surfaces(*moved) < clearly * on_surfaces(*best)) moved.reset();
+    if (best && !moved) return prediction_.begin(prior.t, off), best;
+  }
+  // Samples are wrong only where no other pose explains the sweep, and where it is somewhere else without them.
+  best = std::move(moved);
+  const Replay& samples = history.replay();
+  for (const auto& rate : {std::optional<Eigen::Vector3d>(), samples.gyro_at(history.base().t), std::optional(samples.mean_gyro())}) {
+    if (best || !searches || !(is_lost(prior, out) || is_violent(motion_between(history.base().x, prior.x)))) break;
+    best = try_with(history.doubted(sweep.end, rate));
+    if (best && !out.refused && PredictionCheck::is_small(PredictionCheck::error_between(prior.x, best->sweep.posterior.x))) best.reset();
+  }
+  if (best) best->sweep.unpredicted = true;
+  return best;
 }
 
 Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, History& history, Estimate& prior, PointDrops& drops) {
@@ -69,44 +127,35 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, 
   };
   const auto& doubt = prediction_.error();
   if (auto doubted = doubt ? history.loosened(prior.t, doubt->turned, doubt->moved, prediction_.lasts()) : std::nullopt) {
-    PointDrops counted = drops;
-    if (Attempt other = attempt(lidar, sweep, std::move(*doubted), prior.t, counted); other.sweep.carries) {
+    if (Attempt other = attempt(lidar, sweep, std::move(*doubted), prior.t, drops); other.sweep.carries) {
+      drops = other.drops;
       go_on_with(std::move(other));
-      drops = counted;
     }
   }
   // A doubt of a prior from which the sweep fits nowhere leaves no trace.
   if (!out.carries) out = measure(lidar, sweep, history, prior, drops);
-  const auto try_again_with = [&](std::optional<History> other, const auto& is_right) {
-    if (!other) return false;
-    PointDrops counted;
-    Attempt again = attempt(lidar, sweep, std::move(*other), prior.t, counted);
-    if (again.sweep.refused || !again.sweep.carries || !is_right(again.prior, again.sweep)) return false;
-    go_on_with(std::move(again));
-    return true;
-  };
-  const auto agrees = [&](const Estimate& expected, const Registration& again) {
-    return LidarPipeline::squared_change(expected, again, error_at(expected.x.pose())) < LidarPipeline::agreeing_change;
-  };
   const auto surprise = prediction_.surprise(prior, out, error_at(prior.x.pose()), lidar.is_rejoining());
   const bool is_contradicted = prediction_.contradicts(out);
+  std::optional<Attempt> other;
   if (is_contradicted || surprise == PredictionCheck::Surprise::again) {
-    const auto explains = [&](const Registration& again) {
-      return is_contradicted ? prediction_.explains(again, out) : again.carries && !again.refused;
-    };
-    Registration near = measure_near(lidar, sweep, history, prior, PredictionCheck::released(prior));
-    if (is_contradicted && !explains(near) && prediction_.is_to_be_searched_for())
-      near = measure_near(lidar, sweep, history, prior, PredictionCheck::lost(prior));
-    const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
-    const auto is_right = [&](const Estimate& expected, const Registration& again) {
-      return is_contradicted ? explains(again) : agrees(expected, again);
-    };
-    if (explains(near) && try_again_with(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs()), is_right))
-      prediction_.begin(prior.t, off);
+    other = explain(lidar, sweep, history, prior, out);
   } else if (surprise == PredictionCheck::Surprise::first) {
-    try_again_with(history.loosened(prior.t, 0, (out.posterior.x.p - prior.x.p).norm(), false), agrees);
-  } else if (out.searched && out.refused == Reason::fits_nowhere) {
-    try_again_with(history.doubted(sweep.end), [](const auto&...) { return true; });
+    if (auto pushed = history.loosened(prior.t, 0, (out.posterior.x.p - prior.x.p).norm(), false)) {
+      other = attempt(lidar, sweep, std::move(*pushed), prior.t);
+      if (!agrees(other->prior, other->sweep)) other.reset();
+    }
+  }
+  if (other) {
+    go_on_with(std::move(*other));
+  } else if (is_contradicted && !out.refused && is_lost(prior, out)) {
+    out.refused = Reason::fits_nowhere;
+    out.carries = false;
+    out.posterior = prior;
+  }
+  if (!is_contradicted && out.carries) {
+    const Motion motion = motion_between(history.base().x, predicted.x);
+    usual_motion_.turned2 += (motion.turned2 - usual_motion_.turned2) / PredictionCheck::remembered;
+    usual_motion_.pushed2 += (motion.pushed2 - usual_motion_.pushed2) / PredictionCheck::remembered;
   }
   prediction_.learn(predicted, out, error_at(predicted.x.pose()));
   return out;

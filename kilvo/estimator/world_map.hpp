@@ -56,11 +56,26 @@ class WorldMap {
     History history;
     Estimate prior;
     Registration sweep;
+    PointDrops drops;
+  };
+
+  struct Motion {
+    double turned2 = 0, pushed2 = 0;  // squared, rad and m/s
   };
 
   Registration measure(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior, PointDrops& drops) const;
   /// As another history predicts it.
-  Attempt attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops& drops) const;
+  Attempt attempt(LidarPipeline& lidar, const Sweep& sweep, History history, Time middle, PointDrops drops = {}) const;
+  /// What else may have been than `history`, from which the sweep is beside the surfaces or is not where it was predicted: a pose near by,
+  /// one that the IMU has not moved to, or samples that are wrong. The best of those that explain it.
+  std::optional<Attempt> explain(LidarPipeline& lidar, const Sweep& sweep, const History& history, const Estimate& prior,
+                                 const Registration& out);
+  static Motion motion_between(const State& base, const State& prior);
+  /// The samples of the IMU predict more motion since the last sweep than is usual, as ones do that are wrong.
+  bool is_violent(const Motion& motion) const;
+  /// It fits nowhere, or is not where it was predicted: in a crowd it would be.
+  bool is_lost(const Estimate& prior, const Registration& sweep) const;
+  bool agrees(const Estimate& prior, const Registration& sweep) const;
   /// From where it is found from `released`, with the gate of the prior: that of an uncertain one lets almost everything lie on the
   /// surfaces.
   Registration measure_near(LidarPipeline& lidar, const Sweep& sweep, const History& history, Estimate prior,
@@ -72,6 +87,7 @@ class WorldMap {
   VoxelMap surfaces_;
   MapError error_;
   PredictionCheck prediction_;
+  Motion usual_motion_;  // between sweeps, as the IMU predicts it: means of the last seconds
   bool is_given_ = false;
 };
 

@@ -36,6 +36,7 @@ void ContactEstimator::report(const Feet& feet, const State& x, const std::array
   const double unit = std::sqrt(standard_gravity * cues_.leg_length());
   contacts_.sole_speed = filter_.stance_speed() * unit;
   contacts_.fast_sole = filter_.fast_stance() * unit;
+  contacts_.swing_speed = filter_.swing_speed() * unit;
   contacts_.flight = ContactFilter::is_probable(filter_.probabilities()[ContactFilter::none]);
   for (std::size_t side = 0; side < 2; ++side) {
     const bool stood = contacts_.on[side];

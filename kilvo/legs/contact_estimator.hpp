@@ -29,6 +29,7 @@ struct Contacts {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // of the ground under the feet, in the world
   double sole_speed = 0;                              // of a supporting foot as it is seen, median, as learnt, m/s
   double fast_sole = 0;                               // five of six samples of it are slower, m/s
+  double swing_speed = 0;                             // of a foot that swings, median, as learnt, m/s; 0: not known
 
   /// How long a foot has been on or off, s.
   double phase(std::size_t side) const { return to_seconds(t - since[side]); }

@@ -41,6 +41,7 @@ struct LegStep {
   double velocity_sigma = 0, vertical_velocity_sigma = 0;  // of a standing sole along each horizontal axis and the vertical, m/s
   std::array<Stance, 2> foot;
   std::optional<GyroBiasReading> gyro_bias;
+  std::optional<Eigen::Vector3d> false_velocity;  // by which the state's velocity may be more wrong than it reports, in the world, m/s
   std::optional<double> rise;  // by which the state's vertical velocity may be more wrong than it reports, as the soles show it, m/s
 };
 

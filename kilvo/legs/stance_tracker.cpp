@@ -43,6 +43,15 @@ std::array<double, max_corners> share_of_corners(const FootPose& pose, const Sta
   return out;
 }
 
+Eigen::Vector3d slowest_of(const FootPose& pose, const State& x, const Eigen::Vector3d& omega) {
+  Eigen::Vector3d out = velocity_W(x, pose.p[0], pose.v[0], omega);
+  for (std::size_t k = 1; k < static_cast<std::size_t>(pose.corners); ++k) {
+    const Eigen::Vector3d v = velocity_W(x, pose.p[k], pose.v[k], omega);
+    if (v.squaredNorm() < out.squaredNorm()) out = v;
+  }
+  return out;
+}
+
 // Eq. 8 for each row by itself: how much more it deviates than its noise.
 Eigen::Matrix<double, 7, 1> scale_of_rows(const Eigen::Vector3d& velocity, double velocity2, const Eigen::Vector3d& position,
                                           double position2) {
@@ -224,6 +233,12 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     foot.variance_scale = std::min(lighter * loose / contacts.probability[side], largest_scale * largest_scale);
   }
   out.rise = noise_.take_rise();
+  // Both soles three times as fast as one that swings: the state's velocity is wrong, for samples of the IMU that were.
+  if (support.on_legs_alone && !contacts.flight && contacts.swing_speed > 0) {
+    const Eigen::Vector3d left = slowest_of(feet.foot[0], x, omega), right = slowest_of(feet.foot[1], x, omega);
+    const Eigen::Vector3d& slower = left.squaredNorm() < right.squaredNorm() ? left : right;
+    if (slower.norm() > 3 * contacts.swing_speed) out.false_velocity = slower;
+  }
   return out;
 }
 

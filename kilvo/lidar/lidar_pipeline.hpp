@@ -26,6 +26,7 @@ inline constexpr double known_velocity = 0.15;
 struct Registration {
   std::optional<Reason> refused;  // the state is not changed
   bool searched = false;          // the prior was too uncertain for the nearest planes to be the right ones
+  bool unpredicted = false;       // what predicted it was wrong, and is not used
   Estimate posterior;             // of the prior's time
   bool carries = false;           // it holds three directions at least, and so the estimate; if not, the posterior is the prior
   RegistrationReport report;

@@ -72,6 +72,7 @@ enum class Reason : std::uint8_t {
   unmeasured,
   map_begun_anew,
   state_thrown_away,
+  not_where_predicted,
   foreign_images,
   camera_turned,
   mount_corrected,
@@ -166,6 +167,9 @@ inline constexpr std::array reasons = {
               "the map was restarted, because no sweep fitted it: poses before and after are in different frames"},
     ReasonRow{Reason::state_thrown_away, Severity::warning, "state_thrown_away",
               "an implausible state was discarded: back to that of {} s before", 1, 3},
+    ReasonRow{Reason::not_where_predicted, Severity::warning, "not_where_predicted",
+              "a sweep fits the map [] from where the IMU predicted it: samples of the IMU are wrong, or the robot was moved while nothing "
+              "measured it. The pose jumps there"},
     ReasonRow{Reason::foreign_images, Severity::warning, "foreign_images", "images of []"},
     ReasonRow{Reason::camera_turned, Severity::warning, "camera_turned",
               "the images fit a camera that is rotated by {} degrees or more ([] about the axes of the IMU) against camera.T_imu_camera.R: "

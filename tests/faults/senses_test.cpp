@@ -26,6 +26,16 @@ bool has(const Outcome& o, Reason r) {
   return std::ranges::any_of(o.statistics.events, [r](const Event& e) { return e.reason == r; });
 }
 
+// The robot does not move for so many seconds from 5 s on, as far as any sense can tell.
+Outcome carried(const FailingWalk& walk, int seconds) {
+  const auto carry = [seconds](Measurement& m, double s) {
+    if (s >= 5 && s < 5 + seconds) return false;
+    if (s >= 5) std::visit([seconds](auto& x) { x.t -= std::chrono::seconds(seconds); }, m);
+    return true;
+  };
+  return walk.with({}, {li, carry, {}, [seconds](double s) { return s < 5 ? s : s + seconds; }});
+}
+
 class Senses : public testing::Test {
  protected:
   static void SetUpTestSuite() { walk_ = std::make_unique<FailingWalk>("room", 1, 14); }
@@ -99,6 +109,21 @@ TEST_F(Senses, ABurstOfWrongAccelerationsIsOutlivedWithSweeps) {
   }
 }
 
+// Both soles are then faster than a foot that swings, and no robot walks so.
+TEST_F(Senses, OnTheLegsAVelocityThatNoFootHasIsCorrected) {
+  for (const double accel : {20.0, -20.0}) {
+    for (const int axis : {0, 1}) {
+      const auto hit = [accel, axis](Measurement& m, double s) {
+        if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && s >= 8 && s < 8.2) imu->accel[axis] += accel;
+        return true;
+      };
+      const Outcome o = walk_->with({}, {ki, hit, {}});
+      std::printf("%.0f m/s^2 along %d: %.3f m at the end\n", accel, axis, o.worst(&Moment::error, 13, 14));
+      EXPECT_LT(o.worst(&Moment::error, 13, 14), 0.5);
+    }
+  }
+}
+
 // Two samples that no IMU measures; and two of what one might, which make a velocity that nobody has.
 TEST_F(Senses, OnTheLegsAWrongAccelerationLeavesAnHonestEstimate) {
   for (const auto& [samples, accel] : {std::pair(2, 4000.0), std::pair(2, 900.0)}) {
@@ -128,23 +153,59 @@ TEST_F(Senses, ARecordingPlayedAgainIsAnotherEpoch) {
 // sweeps have fitted nowhere for two seconds; from then on each output says so. (Not of the attitude: the IMU was never told of the
 // carrying.)
 TEST_F(Senses, ARobotThatWasCarriedAwayDoesNotSayThatItKnowsWhere) {
-  const auto carried = [](Measurement& m, double s) {
-    if (s >= 5 && s < 9) return false;
-    if (s >= 9) std::visit([](auto& x) { x.t -= std::chrono::seconds(4); }, m);
-    return true;
-  };
-  const auto where = [](double s) { return s < 5 ? s : s + 4; };
-  const Outcome o = walk_->with({}, {li, carried, {}, where});
+  const FailingWalk walk("room", 1, 20);
+  const Outcome o = carried(walk, 8);
   ASSERT_EQ(o.statistics.maps_begun_anew, 1u);
   const auto anew = std::ranges::find(o.statistics.events, Reason::map_begun_anew, &Event::reason);
   ASSERT_NE(anew, o.statistics.events.end());
-  const double from = walk_->seconds_of(anew->t) + 0.1;
+  const double from = walk.seconds_of(anew->t) + 0.1;
   std::printf("carried: error %.2f m, known at %.2f s: sigma %.2f m, at most %.1f sigmas\n", o.worst(&Moment::error, from, 20), from,
               o.worst(&Moment::sigma, from, 20), o.worst(&Moment::sigmas, from, 20));
   EXPECT_GT(o.worst(&Moment::error, from, 20), 0.5);
   EXPECT_LT(from, 7.6);
   EXPECT_LT(o.worst(&Moment::sigmas, from, 20), 4.0);
   EXPECT_TRUE(o.statistics.diverged);
+}
+
+TEST_F(Senses, ARobotThatWasCarriedAMetreOrTwoIsFound) {
+  const Outcome o = carried(*walk_, 4);
+  std::printf("carried: error %.3f m once it is found\n", o.worst(&Moment::error, 6, 20));
+  EXPECT_LT(o.worst(&Moment::error, 6, 20), 0.02);
+  EXPECT_LT(o.worst(&Moment::sigmas, 6, 20), 4.0);
+  EXPECT_TRUE(has(o, Reason::not_where_predicted));
+  EXPECT_EQ(o.statistics.maps_begun_anew, 0u);
+}
+
+// Until the next sweep nothing tells; then that sweep, and what the samples were before.
+TEST_F(Senses, SamplesOfTheImuThatAreWrongForAMomentAreNotUsed) {
+  struct Fault {
+    const char* name;
+    std::function<void(ImuSample&)> of;
+    double lasts = 0.2;  // s
+  };
+  const std::array faults = {Fault{"accelerometer along the walk", [](ImuSample& s) { s.accel.x() += 20; }},
+                             Fault{"accelerometer across it", [](ImuSample& s) { s.accel.y() -= 20; }},
+                             Fault{"accelerometer upwards, short", [](ImuSample& s) { s.accel.z() += 60; }, 0.05},
+                             Fault{"accelerometer along the walk, short", [](ImuSample& s) { s.accel.x() -= 60; }, 0.05},
+                             Fault{"gyro about the vertical", [](ImuSample& s) { s.gyro.z() += 3; }},
+                             Fault{"gyro about the walk", [](ImuSample& s) { s.gyro.x() -= 3; }}};
+  for (const Fault& fault : faults) {
+    for (const auto& used : {kil, li}) {
+      for (const double at : {8.03, 8.07}) {
+        SCOPED_TRACE(testing::Message() << fault.name << ", legs " << used[1] << ", at " << at);
+        const auto changed = [&](Measurement& m, double s) {
+          if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && s >= at && s < at + fault.lasts) fault.of(*imu);
+          return true;
+        };
+        const Outcome o = walk_->with({}, {used, changed, {}});
+        std::printf("%s, legs %d, %.2f: worst %.1f mm, later %.1f mm\n", fault.name, used[1], at, 1e3 * o.worst(&Moment::error, 0, 14),
+                    1e3 * o.worst(&Moment::error, 9, 14));
+        EXPECT_LT(o.worst(&Moment::error, 9, 14), 0.03);
+        EXPECT_LT(o.worst(&Moment::sigmas, 9, 14), 4.0);
+        EXPECT_FALSE(o.statistics.diverged);
+      }
+    }
+  }
 }
 
 TEST_F(Senses, AWrongMountOfTheLidarIsSaidWithTheSensesThatContradict) {
