@@ -1,5 +1,10 @@
 #include "kilvo/estimator/world_map.hpp"
 
+#include <algorithm>
+#include <cmath>
+
+#include "kilvo/lidar/relocate.hpp"
+
 namespace kilvo {
 
 void WorldMap::give(VoxelMap map) {
@@ -65,8 +70,9 @@ WorldMap::Motion WorldMap::motion_between(const State& base, const State& prior)
 }
 
 bool WorldMap::is_violent(const Motion& motion) const {
-  // Three times as much.
-  return motion.turned2 > 9 * usual_motion_.turned2 || motion.pushed2 > 9 * usual_motion_.pushed2;
+  // Three times as much; of what is usual after standing the first steps are more.
+  return motion.turned2 > 9 * std::max(std::pow(well_known_rotation, 2), usual_motion_.turned2) ||
+         motion.pushed2 > 9 * std::max(std::pow(known_velocity, 2), usual_motion_.pushed2);
 }
 
 bool WorldMap::agrees(const Estimate& prior, const Registration& sweep) const {
