@@ -26,9 +26,12 @@ Estimator make_estimator(const lab::Settings& settings, const std::vector<Sensor
 void fit_to_machine(lab::Settings& settings, bool live, int threads) {
   // On a robot the other cores are for others.
   if (live && !settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
-  // Legs whose time is looked for may come so much later than the IMU's messages; in a recording they can be waited for.
-  if (!live && settings.leg_clock.clock == "estimated" && !settings.given.contains("estimator.max_wait"))
-    settings.estimator.max_wait += lab::RateOffset::reach();
+  // In a recording what comes later than the IMU's messages of the same time can be waited for, and so can legs whose time is looked for.
+  constexpr double recorded_wait = 1;  // s
+  if (!live && !settings.given.contains("estimator.max_wait")) {
+    settings.estimator.max_wait = std::max(settings.estimator.max_wait, recorded_wait);
+    if (settings.leg_clock.clock == "estimated") settings.estimator.max_wait += lab::RateOffset::reach();
+  }
   // Reading and the map keep about one core busy.
   if (!settings.given.contains("estimator.threads")) settings.estimator.threads = live ? 1 : std::max(1, threads - 1);
 }

@@ -1,5 +1,8 @@
 #include "apps/cli/run_failure.hpp"
 
+#include <fmt/core.h>
+#include <numeric>
+
 namespace kilvo::cli {
 
 std::string failure_of(const RunSummary& run_summary, const Estimator& estimator, const lab::RecordingSource& source) {
@@ -15,7 +18,17 @@ std::string failure_of(const RunSummary& run_summary, const Estimator& estimator
     if (event.reason == Reason::diverged) return "diverged: " + event.detail;
   }
   const bool legs_used = estimator.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
-  if (run_summary.sweeps() > 0 || legs_used) return "";
+  if (run_summary.sweeps() > 0 || legs_used) {
+    // After an outage the robot is found again; but most of such a trajectory is of nothing but the IMU.
+    const auto& seconds = run_summary.modality_seconds();
+    const double all = std::accumulate(seconds.begin(), seconds.end(), 0.0, [](double sum, const auto& m) { return sum + m.second; });
+    const auto coast = seconds.find(name_of(Modality::coast));
+    if (coast == seconds.end() || 2 * coast->second <= all) return "";
+    return fmt::format(
+        "in {:.1f} of {:.1f} s neither LiDAR nor legs measured the motion: the positions of that time are integrated from "
+        "the IMU alone",
+        coast->second, all);
+  }
   if (!source.topic(Sensor::lidar).empty()) return "no LiDAR scan could be used";
   return source.topic(Sensor::legs).empty() ? "" : "no message of the legs could be used: the positions are integrated from the IMU alone";
 }

@@ -1,7 +1,6 @@
 #include "kilvo/estimator/world_map.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "kilvo/lidar/relocate.hpp"
 
@@ -71,8 +70,8 @@ WorldMap::Motion WorldMap::motion_between(const State& base, const State& prior)
 
 bool WorldMap::is_violent(const Motion& motion) const {
   // Three times as much; of what is usual after standing the first steps are more.
-  return motion.turned2 > 9 * std::max(std::pow(well_known_rotation, 2), usual_motion_.turned2) ||
-         motion.pushed2 > 9 * std::max(std::pow(known_velocity, 2), usual_motion_.pushed2);
+  return motion.turned2 > 9 * std::max(well_known_rotation * well_known_rotation, usual_motion_.turned2) ||
+         motion.pushed2 > 9 * std::max(known_velocity * known_velocity, usual_motion_.pushed2);
 }
 
 bool WorldMap::agrees(const Estimate& prior, const Registration& sweep) const {
@@ -93,8 +92,7 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
   const auto try_with = [&](std::optional<History> other) -> std::optional<Attempt> {
     if (!other) return std::nullopt;
     Attempt again = attempt(lidar, sweep, std::move(*other), prior.t);
-    if (!(is_contradicted ? explains(again.sweep) : agrees(again.prior, again.sweep))) return std::nullopt;
-    return again;
+    return (is_contradicted ? explains(again.sweep) : agrees(again.prior, again.sweep)) ? std::optional(std::move(again)) : std::nullopt;
   };
   const auto on_surfaces = [](const Attempt& a) {
     return static_cast<double>(a.sweep.report.matched) / std::max(1, a.sweep.report.clusters);

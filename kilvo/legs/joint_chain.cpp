@@ -63,8 +63,10 @@ KDL::Tree tree_of(const Robot& robot) {
   const UrdfLog words;
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(robot.urdf);
   if (!model || !model->getRoot()) throw std::invalid_argument("robot.urdf is not a URDF document" + words.first());
-  KDL::Tree tree(model->getRoot()->name);
-  add_children(*model->getRoot(), robot, tree);
+  urdf::LinkConstSharedPtr root = model->getRoot();  // of the robot, not of a world in which it floats
+  while (root->child_links.size() == 1 && root->child_joints[0]->type == urdf::Joint::FLOATING) root = root->child_links[0];
+  KDL::Tree tree(root->name);
+  add_children(*root, robot, tree);
   return tree;
 }
 

@@ -99,5 +99,18 @@ TEST(LegKinematics, AFloatingJointOnTheWayIsRefusedUnlessItIsLocked) {
   EXPECT_EQ(refusal_of(robot), "no exception");
 }
 
+// The URDFs of many humanoids begin with a world, for simulators.
+TEST(LegKinematics, AWorldInWhichTheRobotFloatsIsNoPartOfIt) {
+  test::Random random(11);
+  Robot robot = test::biped(random);
+  const std::string pelvis = "<link name=\"pelvis\"/>";
+  const auto where = robot.urdf.find(pelvis);
+  ASSERT_NE(where, std::string::npos);
+  robot.urdf.insert(where,
+                    "<link name=\"world\"/><joint name=\"floating_base\" type=\"floating\"><parent link=\"world\"/>"
+                    "<child link=\"pelvis\"/></joint>");
+  EXPECT_EQ(refusal_of(robot), "no exception");
+}
+
 }  // namespace leg_refusals_test
 }  // namespace kilvo

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -85,18 +86,27 @@ bool Examination::lidar_scale_contradicts() const {
 }
 
 // Points of another unit are as wrong for slow motion as for fast one, and it knows their scale better. An accelerometer that aliases or is
-// filtered explains neither, and is no witness: then false, and the scale is unknown.
+// filtered explains neither, and is no witness: then false, and the scale is unknown. Sampling errors go with the square of the period, so
+// that those of half of the samples are four times as large (L. F. Richardson, 1911).
 bool Examination::settle_lidar_scale_by_slow_motion(const SO3& R_IL) {
   constexpr double apart = 0.25,
                    known = 0.06;  // s, -: true scales of 0.3 to 1.5 were known to 0.05, those of an aliasing IMU to 0.07 to 0.2
   std::vector<SweepPose> slow;
   for (const SweepPose& pose : way_)
     if (slow.empty() || pose.t - slow.back().t > apart) slow.push_back(pose);
-  const TranslationRows rows(slow, recorded_.imu, gyro(), R_IL, lidar_offset_);
-  const auto fit = rows.fit(accel_axes_);
-  if (!fit) return true;
-  const double fast = std::exchange(lidar_scale_, rows.scale(accel_axes_, *fit)).factor;
-  if (lidar_scale_.sigma < known * lidar_scale_.factor) return true;
+  std::vector<InertialSample> half;
+  for (std::size_t i = 0; i < recorded_.imu.size(); i += 2) half.push_back(recorded_.imu[i]);
+  const auto scale_with = [&](const std::vector<SweepPose>& way, const std::vector<InertialSample>& imu) -> std::optional<WayScale> {
+    const TranslationRows rows(way, imu, gyro(), R_IL, lidar_offset_);
+    const auto fit = rows.fit(accel_axes_);
+    return fit ? std::optional(rows.scale(accel_axes_, *fit)) : std::nullopt;
+  };
+  const double fast = lidar_scale_.factor;
+  const auto of_slow = scale_with(slow, recorded_.imu);
+  if (of_slow) lidar_scale_ = *of_slow;
+  if (const auto coarse = scale_with(of_slow ? slow : way_, half))
+    lidar_scale_.sigma = std::hypot(lidar_scale_.sigma, (coarse->factor - lidar_scale_.factor) / 3);
+  if (lidar_scale_.sigma < known * (of_slow ? lidar_scale_.factor : std::max(1.0, lidar_scale_.factor))) return true;
   check(Sensor::lidar, "position of the mount", Check::Verdict::unknown,
         fmt::format(
             "way of the sweeps through that of the accelerometer: {:.2f}, of three sweeps together {:.2f}, standard deviation {:.2f}: "
