@@ -28,8 +28,8 @@ void fit_to_machine(lab::Settings& settings, bool live, int threads) {
   if (live && !settings.given.contains("estimator.wait_for_images")) settings.estimator.wait_for_images = false;
   // In a recording what comes later than the IMU's messages of the same time can be waited for, and so can legs whose time is looked for.
   constexpr double recorded_wait = 1;  // s
-  if (!live && !settings.given.contains("estimator.max_wait")) {
-    settings.estimator.max_wait = std::max(settings.estimator.max_wait, recorded_wait);
+  if (!live && settings.estimator.max_wait == EstimatorConfig{}.max_wait) {
+    settings.estimator.max_wait = recorded_wait;
     if (settings.leg_clock.clock == "estimated") settings.estimator.max_wait += lab::RateOffset::reach();
   }
   // Reading and the map keep about one core busy.

@@ -1,7 +1,6 @@
 #include "apps/cli/run_failure.hpp"
 
 #include <fmt/core.h>
-#include <numeric>
 
 namespace kilvo::cli {
 
@@ -20,14 +19,10 @@ std::string failure_of(const RunSummary& run_summary, const Estimator& estimator
   const bool legs_used = estimator.statistics().sensors[static_cast<std::size_t>(Sensor::legs)].used > 0;
   if (run_summary.sweeps() > 0 || legs_used) {
     // After an outage the robot is found again; but most of such a trajectory is of nothing but the IMU.
-    const auto& seconds = run_summary.modality_seconds();
-    const double all = std::accumulate(seconds.begin(), seconds.end(), 0.0, [](double sum, const auto& m) { return sum + m.second; });
-    const auto coast = seconds.find(name_of(Modality::coast));
-    if (coast == seconds.end() || 2 * coast->second <= all) return "";
+    if (2 * run_summary.unmeasured_seconds() <= run_summary.output_seconds()) return "";
     return fmt::format(
-        "in {:.1f} of {:.1f} s neither LiDAR nor legs measured the motion: the positions of that time are integrated from "
-        "the IMU alone",
-        coast->second, all);
+        "in {:.1f} of {:.1f} s neither LiDAR nor legs measured the motion: the positions of that time are integrated from the IMU alone",
+        run_summary.unmeasured_seconds(), run_summary.output_seconds());
   }
   if (!source.topic(Sensor::lidar).empty()) return "no LiDAR scan could be used";
   return source.topic(Sensor::legs).empty() ? "" : "no message of the legs could be used: the positions are integrated from the IMU alone";

@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include "kilvo/lidar/lidar_pipeline.hpp"
+
 namespace kilvo::cli {
 namespace {
 
@@ -36,7 +38,7 @@ double StageClock::total() const {
 void RunSummary::add(const Output& output) {
   const StampedState now{output.t, output.x.pose()};
   if (!first_) first_ = last_on_path_ = now;
-  if (last_) modality_seconds_[name_of(output.modality)] += to_seconds(output.t - last_->t);
+  if (last_) count_seconds(output, to_seconds(output.t - last_->t));
   const bool on_path = output.is_sweep || output.t - last_on_path_->t >= (sweeps_ == 0 ? 1 : 3) * path_period;
   if (on_path) {
     path_length_ += (now.T_WI.p - last_on_path_->T_WI.p).norm();
@@ -46,6 +48,16 @@ void RunSummary::add(const Output& output) {
   ++outputs_;
   if (output.contacts) count_touchdowns(*output.contacts);
   judge(output);
+}
+
+void RunSummary::count_seconds(const Output& output, double dt) {
+  modality_seconds_[name_of(output.modality)] += dt;
+  constexpr double gap = 0.1;  // s
+  if (dt > gap) return;
+  output_seconds_ += dt;
+  // A robot that stands is held by that.
+  const bool is_known = output.P.diagonal().segment<3>(at::v).maxCoeff() < known_velocity * known_velocity;
+  if (output.modality == Modality::coast && !is_known) unmeasured_ += dt;
 }
 
 void RunSummary::count_touchdowns(const Contacts& contacts) {

@@ -59,17 +59,22 @@ class RunSummary {
   const std::array<std::uint64_t, 2>& contact_events() const { return contact_events_; }
   double start_to_end() const { return first_ ? (last_->T_WI.p - first_->T_WI.p).norm() : 0; }
   const std::map<std::string, double>& modality_seconds() const { return modality_seconds_; }
+  /// While there were outputs neither LiDAR nor legs measured the motion, and the velocity was not known: of all seconds with outputs.
+  double unmeasured_seconds() const { return unmeasured_; }
+  double output_seconds() const { return output_seconds_; }
   /// Why the trajectory cannot be right; empty when nothing speaks against it.
   const std::string& absurdity() const { return absurdity_; }
 
  private:
   void judge(const Output& output);
+  void count_seconds(const Output& output, double dt);
   void count_touchdowns(const Contacts& contacts);
 
   std::size_t outputs_ = 0, sweeps_ = 0;
   std::optional<StampedState> first_, last_, last_on_path_;
   double path_length_ = 0;
   std::map<std::string, double> modality_seconds_;
+  double output_seconds_ = 0, unmeasured_ = 0;  // s, without gaps of the outputs
   std::string absurdity_;
   std::array<bool, 2> on_ = {true, true};
   std::array<std::uint64_t, 2> contact_events_ = {0, 0};

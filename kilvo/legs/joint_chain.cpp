@@ -26,11 +26,10 @@ KDL::Joint to_kdl(const urdf::Joint& joint, bool locked) {
   constexpr double absurd_length = 100;  // m
   if (!(origin.p.Norm() < absurd_length)) throw fault(": origin is over 100 m away");
   if (locked || joint.type == urdf::Joint::FIXED) return KDL::Joint(joint.name, KDL::Joint::Fixed);
-  if (!(axis.Norm() > 1e-6)) throw fault(": axis has no length");
-  if (joint.type == urdf::Joint::PRISMATIC) return {joint.name, origin.p, axis, KDL::Joint::TransAxis};
-  if (joint.type != urdf::Joint::REVOLUTE && joint.type != urdf::Joint::CONTINUOUS)
+  if (joint.type != urdf::Joint::PRISMATIC && joint.type != urdf::Joint::REVOLUTE && joint.type != urdf::Joint::CONTINUOUS)
     throw fault(" is neither revolute, prismatic nor fixed");
-  return {joint.name, origin.p, axis, KDL::Joint::RotAxis};
+  if (!(axis.Norm() > 1e-6)) throw fault(": axis has no length");
+  return {joint.name, origin.p, axis, joint.type == urdf::Joint::PRISMATIC ? KDL::Joint::TransAxis : KDL::Joint::RotAxis};
 }
 
 void add_children(const urdf::Link& link, const Robot& robot, KDL::Tree& tree) {
@@ -64,7 +63,8 @@ KDL::Tree tree_of(const Robot& robot) {
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(robot.urdf);
   if (!model || !model->getRoot()) throw std::invalid_argument("robot.urdf is not a URDF document" + words.first());
   urdf::LinkConstSharedPtr root = model->getRoot();  // of the robot, not of a world in which it floats
-  while (root->child_links.size() == 1 && root->child_joints[0]->type == urdf::Joint::FLOATING) root = root->child_links[0];
+  const auto is_world = [&](const urdf::Link& link) { return link.name != robot.imu.link && link.child_links.size() == 1; };
+  while (is_world(*root) && root->child_joints[0]->type == urdf::Joint::FLOATING) root = root->child_links[0];
   KDL::Tree tree(root->name);
   add_children(*root, robot, tree);
   return tree;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "kilvo/legs/joint_chain.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
 #include "tests/helpers/test_biped.hpp"
 
@@ -110,6 +111,8 @@ TEST(LegKinematics, AWorldInWhichTheRobotFloatsIsNoPartOfIt) {
                     "<link name=\"world\"/><joint name=\"floating_base\" type=\"floating\"><parent link=\"world\"/>"
                     "<child link=\"pelvis\"/></joint>");
   EXPECT_EQ(refusal_of(robot), "no exception");
+  EXPECT_EQ(LinkTree(robot).root(), "pelvis");
+  EXPECT_FALSE(LinkTree(robot).has("world"));
 }
 
 }  // namespace leg_refusals_test

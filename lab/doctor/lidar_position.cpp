@@ -96,6 +96,7 @@ bool Examination::settle_lidar_scale_by_slow_motion(const SO3& R_IL) {
     if (slow.empty() || pose.t - slow.back().t > apart) slow.push_back(pose);
   std::vector<InertialSample> half;
   for (std::size_t i = 0; i < recorded_.imu.size(); i += 2) half.push_back(recorded_.imu[i]);
+  if (half.back().t < recorded_.imu.back().t) half.push_back(recorded_.imu.back());
   const auto scale_with = [&](const std::vector<SweepPose>& way, const std::vector<InertialSample>& imu) -> std::optional<WayScale> {
     const TranslationRows rows(way, imu, gyro(), R_IL, lidar_offset_);
     const auto fit = rows.fit(accel_axes_);

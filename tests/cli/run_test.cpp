@@ -110,6 +110,14 @@ TEST_F(Run, TheImuAloneCoasts) {
   EXPECT_FALSE(summary()["messages"].contains("lidar"));
 }
 
+// It stands for 1.5 s; and without the IMU there are no outputs.
+TEST_F(Run, ARobotThatStandsOrAGapOfTheImuIsNotUnmeasured) {
+  const Finished stands = run({"--sensors", "imu,lidar", "--drop", "lidar:0-1.3", "--duration", "2"});
+  EXPECT_EQ(stands.code, 0) << stands.err;
+  const Finished paused = run({"--drop", "imu:0.7-2.2", "--drop", "lidar:0.7-2.2", "--duration", "2.6"});
+  EXPECT_EQ(paused.code, 0) << paused.err;
+}
+
 TEST_F(Run, DroppedScansAreCountedAndBridged) {
   ASSERT_EQ(run({"--drop", "lidar:2-3", "--drop", "lidar:3.75-"}).code, 0);
   const auto lidar = summary()["messages"]["lidar"];
