@@ -2,8 +2,6 @@
 
 #include <fmt/core.h>
 
-#include "kilvo/lidar/lidar_pipeline.hpp"
-
 namespace kilvo::cli {
 namespace {
 
@@ -52,12 +50,11 @@ void RunSummary::add(const Output& output) {
 
 void RunSummary::count_seconds(const Output& output, double dt) {
   modality_seconds_[name_of(output.modality)] += dt;
-  constexpr double gap = 0.1;  // s
+  constexpr double gap = 0.1, stands = 0.05;  // s, m/s
   if (dt > gap) return;
   output_seconds_ += dt;
   // A robot that stands is held by that.
-  const bool is_known = output.P.diagonal().segment<3>(at::v).maxCoeff() < known_velocity * known_velocity;
-  if (output.modality == Modality::coast && !is_known) unmeasured_ += dt;
+  if (output.modality == Modality::coast && output.x.v.norm() > stands) unmeasured_ += dt;
 }
 
 void RunSummary::count_touchdowns(const Contacts& contacts) {

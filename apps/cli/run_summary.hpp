@@ -59,7 +59,7 @@ class RunSummary {
   const std::array<std::uint64_t, 2>& contact_events() const { return contact_events_; }
   double start_to_end() const { return first_ ? (last_->T_WI.p - first_->T_WI.p).norm() : 0; }
   const std::map<std::string, double>& modality_seconds() const { return modality_seconds_; }
-  /// While there were outputs neither LiDAR nor legs measured the motion, and the velocity was not known: of all seconds with outputs.
+  /// While the robot moved and neither LiDAR nor legs measured that: of output_seconds().
   double unmeasured_seconds() const { return unmeasured_; }
   double output_seconds() const { return output_seconds_; }
   /// Why the trajectory cannot be right; empty when nothing speaks against it.
