@@ -8,7 +8,7 @@ namespace kilvo {
 namespace {
 
 // Of one sensor no more waits than this: bytes, and time between the oldest and the newest.
-constexpr std::size_t most_bytes = std::size_t{256} << 20;
+constexpr std::size_t most_bytes = std::size_t{64} << 20;
 constexpr Duration most_time = std::chrono::seconds(3);
 
 std::size_t bytes_of(const Measurement& m) {
