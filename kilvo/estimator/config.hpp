@@ -59,7 +59,7 @@ struct EstimatorConfig {
 
   static constexpr auto fields() {
     return std::tuple{
-        Field{"max_wait", &EstimatorConfig::max_wait, "s", "data time, earlier stamps are waited for; kilvo run: 1 if this is 0.2"},
+        Field{"max_wait", &EstimatorConfig::max_wait, "s", "how long earlier stamps are waited for, in data time; kilvo run: 1 if 0.2"},
         Field{"max_imu_gap", &EstimatorConfig::max_imu_gap, "s", "a longer gap between IMU samples is bridged with a large covariance"},
         Field{"wait_for_images", &EstimatorConfig::wait_for_images, "-",
               "outputs wait for images of earlier stamps; false (in the live runner): late images are fused when they come"},

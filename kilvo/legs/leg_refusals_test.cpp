@@ -88,13 +88,18 @@ TEST(LegKinematics, TwoFeetAreSixPositionsAndNotTwelveAngles) {
   EXPECT_TRUE(std::holds_alternative<Feet>(legs.feet(s)));
 }
 
-TEST(LegKinematics, AFloatingJointOnTheWayIsRefusedUnlessItIsLocked) {
+// `by` in place of `what` in its URDF.
+Robot biped_with(const std::string& what, const std::string& by) {
   test::Random random(10);
   Robot robot = test::biped(random);
-  const std::string revolute = "<joint name=\"left_3\" type=\"prismatic\">";
-  const auto where = robot.urdf.find(revolute);
-  ASSERT_NE(where, std::string::npos);
-  robot.urdf.replace(where, revolute.size(), "<joint name=\"left_3\" type=\"floating\">");
+  const auto where = robot.urdf.find(what);
+  EXPECT_NE(where, std::string::npos) << what;
+  if (where != std::string::npos) robot.urdf.replace(where, what.size(), by);
+  return robot;
+}
+
+TEST(LegKinematics, AFloatingJointOnTheWayIsRefusedUnlessItIsLocked) {
+  Robot robot = biped_with("<joint name=\"left_3\" type=\"prismatic\">", "<joint name=\"left_3\" type=\"floating\">");
   EXPECT_THAT(refusal_of(robot), HasSubstr("left_3"));
   robot.locked_joints = {"left_3"};
   EXPECT_EQ(refusal_of(robot), "no exception");
@@ -102,14 +107,9 @@ TEST(LegKinematics, AFloatingJointOnTheWayIsRefusedUnlessItIsLocked) {
 
 // The URDFs of many humanoids begin with a world, for simulators.
 TEST(LegKinematics, AWorldInWhichTheRobotFloatsIsNoPartOfIt) {
-  test::Random random(11);
-  Robot robot = test::biped(random);
-  const std::string pelvis = "<link name=\"pelvis\"/>";
-  const auto where = robot.urdf.find(pelvis);
-  ASSERT_NE(where, std::string::npos);
-  robot.urdf.insert(where,
-                    "<link name=\"world\"/><joint name=\"floating_base\" type=\"floating\"><parent link=\"world\"/>"
-                    "<child link=\"pelvis\"/></joint>");
+  const Robot robot = biped_with("<link name=\"pelvis\"/>",
+                                 "<link name=\"world\"/><link name=\"pelvis\"/><joint name=\"floating_base\" type=\"floating\">"
+                                 "<parent link=\"world\"/><child link=\"pelvis\"/></joint>");
   EXPECT_EQ(refusal_of(robot), "no exception");
   EXPECT_EQ(LinkTree(robot).root(), "pelvis");
   EXPECT_FALSE(LinkTree(robot).has("world"));

@@ -107,12 +107,12 @@ bool Examination::settle_lidar_scale_by_slow_motion(const SO3& R_IL) {
   if (of_slow) lidar_scale_ = *of_slow;
   if (const auto coarse = scale_with(of_slow ? slow : way_, half))
     lidar_scale_.sigma = std::hypot(lidar_scale_.sigma, (coarse->factor - lidar_scale_.factor) / 3);
+  // A short way shows no slow motion: of a small factor the error itself counts.
   if (lidar_scale_.sigma < known * (of_slow ? lidar_scale_.factor : std::max(1.0, lidar_scale_.factor))) return true;
   check(Sensor::lidar, "position of the mount", Check::Verdict::unknown,
-        fmt::format(
-            "way of the sweeps through that of the accelerometer: {:.2f}, of three sweeps together {:.2f}, standard deviation {:.2f}: "
-            "the accelerometer aliases, is filtered, or its stamps are wrong",
-            fast, lidar_scale_.factor, lidar_scale_.sigma));
+        fmt::format("way of the sweeps through that of the accelerometer: {:.2f}, {} {:.2f}, standard deviation {:.2f}: "
+                    "the accelerometer aliases, is filtered, or its stamps are wrong",
+                    fast, of_slow ? "of three sweeps together" : "of the same sweeps", lidar_scale_.factor, lidar_scale_.sigma));
   translation_.reset();
   lidar_scale_ = {};
   return false;
