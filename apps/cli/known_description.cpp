@@ -116,7 +116,8 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
       else if (known.stops(w))
         lab::put(known.mended, w.finding.changes);
     }
-    if (!known.mended.empty()) {
+    // Beside clocks alone, a description that the data do not contradict is kept.
+    if (std::ranges::any_of(known.mended, [](const lab::Change& c) { return !c.key.ends_with(".time_offset"); })) {
       put_taken(known.mended, measured_after(first, options, mended(known, options, config), used).refinements);
     }
   } else {
