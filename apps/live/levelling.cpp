@@ -28,10 +28,18 @@ void Levelling::add(Output& o) {
 std::optional<Event> Levelling::finish() {
   if (R_LW_ || !first_) return std::nullopt;
   R_LW_ = SO3();
-  // Knowing one of two directions is better than none.
-  if ((!is_settled_ && !(least_sigma_ < 0.5 * first_sigma_)) || !(g_.z() < 0)) return std::nullopt;
+  if (!(g_.z() < 0)) return std::nullopt;
   const Eigen::Vector3d up = -g_.normalized();
-  R_LW_ = SO3::nearest(Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix());
+  const SO3 turn = SO3::nearest(Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix());
+  if (!is_settled_ && !(sigma_ < LevelGround::known_vertical)) {
+    // Knowing one of two directions is better than none. But accelerometers err in step with the robot's steps, which their sigma does
+    // not contain: what is not known well may not contradict a start at rest. Who began on the move guessed.
+    constexpr double nearly_known = 4e-3, guessed = 1e-2, most_sigmas = 3;  // rad, rad, -
+    const bool is_better = least_sigma_ < 0.5 * first_sigma_ || sigma_ < std::min(nearly_known, first_sigma_);
+    const bool contradicts = first_sigma_ < guessed && turn.Log().norm() > most_sigmas * first_sigma_;
+    if (!is_better || contradicts) return std::nullopt;
+  }
+  R_LW_ = turn;
   return Event{last_, {}, Reason::levelled, R_LW_->Log().norm(), 1, {}};
 }
 

@@ -70,6 +70,37 @@ TEST(Levelling, WaitsAsLongAsItMay) {
   EXPECT_FALSE(patient.turn());
 }
 
+// The accelerometer at rest knew the vertical to 5 mrad: 20 mrad contradict it, and stand only where they are known.
+TEST(Levelling, DoesNotFollowAGravityThatContradictsTheStartAndIsNotKnown) {
+  for (const double sigma : {0.02, 0.004}) {
+    Levelling levelling;
+    for (double s = 0; s < 22; s += 0.5) {
+      Output o = walking(0);
+      o.t = walking(s).t;
+      o.x.g = SO3::Exp(Eigen::Vector3d(0.02, 0, 0)) * Eigen::Vector3d(0, 0, -9.80665);
+      if (s > 10) o.P.diagonal().segment<2>(at::g).setConstant(sigma * sigma);
+      levelling.add(o);
+    }
+    ASSERT_TRUE(levelling.turn());
+    EXPECT_NEAR(levelling.turn()->Log().norm(), sigma > 0.01 ? 0 : 0.02, 1e-9);
+  }
+}
+
+// On the move it began with a guess, of 40 mrad.
+TEST(Levelling, FollowsAGravityThatContradictsAGuess) {
+  Levelling levelling;
+  for (double s = 0; s < 22; s += 0.5) {
+    Output o = walking(0);
+    o.t = walking(s).t;
+    o.x.g = SO3::Exp(Eigen::Vector3d(0.15, 0, 0)) * Eigen::Vector3d(0, 0, -9.80665);
+    const double sigma = s > 10 ? 0.16 : 0.4;
+    o.P.diagonal().segment<2>(at::g).setConstant(sigma * sigma);
+    levelling.add(o);
+  }
+  ASSERT_TRUE(levelling.turn());
+  EXPECT_NEAR(levelling.turn()->Log().norm(), 0.15, 1e-9);
+}
+
 TEST(Levelling, FollowsTheLegsWhereTheyHaveSettledTheVertical) {
   Levelling levelling(Duration::max());
   EXPECT_TRUE(events_of(levelling, 0, 3).empty());
