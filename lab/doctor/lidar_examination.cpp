@@ -54,10 +54,11 @@ void Examination::examine_lidar() {
   const std::size_t before = diagnosis_.findings.size();
   examine_point_times();
   const MountFit fit = examine_lidar_rotation();
+  const std::string times = diagnosis_.findings.size() > before ? diagnosis_.findings[before].cause : "";
   // Without times a sweep is taken at its stamp: that half a sweep is missing is no fault of the clock.
-  if (diagnosis_.findings.size() > before && diagnosis_.findings[before].cause == "point_times_absent") return;
-  if (way_.empty()) return;
-  examine_lidar_clock(fit);
+  if (times == "point_times_absent" || way_.empty()) return;
+  // Nor is it that wrong times are of another moment in the middle.
+  if (times != "clouds_deskewed" && times != "point_times_unit") examine_lidar_clock(fit);
   examine_lidar_position();
 }
 
@@ -202,6 +203,13 @@ void Examination::examine_lidar_clock(const MountFit& fit) {
           "",
           {},
           true});
+    return;
+  }
+  // Between a quarter and three quarters of a sweep: clouds that are deskewed already are half a sweep off.
+  if (point_times_are_open_ && std::abs(std::abs(fit.offset) - 0.5 * span) < 0.25 * span) {
+    check(Sensor::lidar, "clock", Check::Verdict::unknown,
+          detail + ": so is that of clouds which the driver has deskewed already; more turning would show which it is");
+    seems_wrong(Sensor::lidar) = true;
     return;
   }
   find_offset(Sensor::lidar, fit.offset, sigma, "turning of the sweeps against the gyro's");
