@@ -99,7 +99,7 @@ void DescriptionWatch::take(const Measurement& measurement) {
 void DescriptionWatch::begin(Time t) {
   begin_ = last_ = t;
   if (!origin_) origin_ = t;
-  recorder_ = Recorder(leg_clock_is_found_);
+  recorder_ = Recorder(reading_);
   // What a window in which the robot moved has left open needs all of another one.
   due_ = windows_ == 0 ? 0 : dues.size() - 1;
   turned_ = 0;

@@ -193,7 +193,8 @@ void Examination::examine_lidar_clock(const MountFit& fit) {
   for (const Sweep& s : recorded_.sweeps) spans.push_back(s.end - s.begin);
   std::ranges::nth_element(spans, spans.begin() + static_cast<std::ptrdiff_t>(spans.size() / 2));
   const double span = spans[spans.size() / 2], period = recorded_.stamps[static_cast<std::size_t>(Sensor::lidar)].period;
-  if (span < 0.7 * period && std::abs(fit.offset - 0.5 * (period - span)) < std::max(0.004, sure * sigma)) {
+  if (!recorded_.reading.without_deskew && span < 0.7 * period &&
+      std::abs(fit.offset - 0.5 * (period - span)) < std::max(0.004, sure * sigma)) {
     find({Sensor::lidar,
           "point_times_unit",
           fmt::format("the points' times span {:.2f} ms of sweeps that take {:.0f} ms", 1e3 * span, 1e3 * period),

@@ -165,10 +165,11 @@ void Examination::accuse_point_times(double times, const Deskew& deskew, const s
         "the clouds are motion-compensated already: with the points' times, which they still have, the motion within a sweep is removed "
         "twice";
     f.evidence += fmt::format("; taken as measured at once, {:.0f} ms after their stamps, sweeps turn as the gyro does", 1e3 * f.size);
-    f.remedy = "kilvo run --no-deskew (live: no_deskew), or the driver must publish the points as they were measured";
+    f.changes = {{"lidar.deskew", "false"}};
     constexpr double negligible = 0.005;  // s, that the estimator finds and corrects by itself
-    if (std::abs(f.size) > negligible)
-      f.remedy += fmt::format("; --no-deskew needs lidar.time_offset: {:.4f}", robot_.lidar.time_offset + f.size);
+    if (std::abs(f.size) > negligible) f.changes.push_back({"lidar.time_offset", fmt::format("{:.4f}", robot_.lidar.time_offset + f.size)});
+    for (const Change& c : f.changes) f.remedy += fmt::format("{}{}: {}", f.remedy.empty() ? "" : " and ", c.key, c.value);
+    f.remedy += ", or the driver must publish the points as they were measured";
   }
   find(std::move(f));
 }

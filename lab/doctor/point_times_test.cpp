@@ -46,8 +46,8 @@ const Walked& walked() {
 
 using Change = std::function<void(LidarScan&)>;
 
-Recorded recorded(const Change& change) {
-  Recorder recorder;
+Recorded recorded(const Change& change, const Reading& reading = {}) {
+  Recorder recorder(reading);
   for (Measurement measurement : walked().measurements) {
     if (auto* scan = std::get_if<LidarScan>(&measurement)) change(*scan);
     recorder.push(measurement);
@@ -87,15 +87,20 @@ TEST(PointTimes, CloudsThatAreDeskewedAlreadyAreNamedAndNothingElse) {
     ASSERT_THAT(causes(diagnosis.findings), ElementsAre("clouds_deskewed")) << after;
     const Finding& finding = diagnosis.findings.front();
     EXPECT_NEAR(finding.size, 1e-3 * after, 3e-3) << "where the clouds are deskewed to, after the stamp";
-    EXPECT_THAT(finding.remedy, testing::HasSubstr("--no-deskew"));
-    EXPECT_EQ(finding.remedy.find("lidar.time_offset") != std::string::npos, after > 0) << finding.remedy;
+    ASSERT_EQ(finding.changes.size(), after > 0 ? 2U : 1U) << finding.remedy;
+    EXPECT_EQ(finding.changes[0].key + "=" + finding.changes[0].value, "lidar.deskew=false");
+    if (after > 0) {
+      EXPECT_EQ(finding.changes[1].key, "lidar.time_offset");
+      EXPECT_NEAR(std::stod(finding.changes[1].value), 1e-3 * after, 3e-3);
+    }
+    for (const auto& change : finding.changes) EXPECT_THAT(finding.remedy, testing::HasSubstr(change.key + ": " + change.value));
   }
 }
 
 TEST(PointTimes, ARunIsToldOfDeskewedCloudsInItsFirstSeconds) {
   for (const int after : {0, 100}) {
     const Change change = deskewed_to(std::chrono::milliseconds(after));
-    DescriptionWatch watch(walked().robot, false, DescriptionWatch::Judging::here);
+    DescriptionWatch watch(walked().robot, {}, DescriptionWatch::Judging::here);
     for (Measurement measurement : walked().measurements) {
       if (auto* scan = std::get_if<LidarScan>(&measurement)) change(*scan);
       watch.take(measurement);
@@ -104,10 +109,41 @@ TEST(PointTimes, ARunIsToldOfDeskewedCloudsInItsFirstSeconds) {
     for (const WrongDescription& wrong : watch.finish()) {
       findings.push_back(wrong.finding);
       EXPECT_TRUE(wrong.spoils);
-      EXPECT_FALSE(wrong.is_mendable) << "no setting does it";
+      EXPECT_TRUE(wrong.is_mendable);
     }
     EXPECT_THAT(causes(findings), ElementsAre("clouds_deskewed")) << after;
   }
+}
+
+/// As clouds are read with lidar.deskew: false, and lidar.time_offset.
+Change at_once(const Change& change, Duration time_offset) {
+  return [change, time_offset](LidarScan& scan) {
+    change(scan);
+    scan.t += time_offset;
+    for (LidarPoint& point : scan.points) point.offset_ns = 0;
+  };
+}
+
+TEST(PointTimes, OfDeskewedCloudsAreNoFaultOnceTheyAreNotUsed) {
+  for (const int after : {0, 50, 100}) {
+    const auto there = std::chrono::milliseconds(after);
+    EXPECT_THAT(causes(recorded(at_once(deskewed_to(there), there), {.without_deskew = true})), IsEmpty()) << after;
+  }
+}
+
+// A half of a sweep of another stamp is then a fault of the clock, and not of the times.
+TEST(PointTimes, WhereTheyAreNotUsedTheClockIsJudged) {
+  const auto there = std::chrono::milliseconds(50);
+  const Recorded early = recorded(at_once(deskewed_to(there), Duration(0)), {.without_deskew = true});
+  const Diagnosis diagnosis = Examination(early, walked().robot).run();
+  ASSERT_THAT(causes(diagnosis.findings), ElementsAre("lidar_clock"));
+  EXPECT_NEAR(diagnosis.findings.front().size, 0.05, 3e-3);
+}
+
+TEST(PointTimes, ThatAreAbsentAreAFaultOnlyWhereTheyAreToBeUsed) {
+  const Change none = at_once([](LidarScan&) {}, std::chrono::milliseconds(50));
+  EXPECT_THAT(causes(recorded(none)), ElementsAre("point_times_absent"));
+  EXPECT_THAT(causes(recorded(none, {.without_deskew = true})), testing::Not(testing::Contains("point_times_absent")));
 }
 
 TEST(PointTimes, TimesThatAreTooLongOrRunBackwardsAreNamedAndNothingElse) {

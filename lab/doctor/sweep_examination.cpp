@@ -47,12 +47,13 @@ void Examination::turn_with(std::vector<SweepPose> way) {
 void Examination::examine_point_times() {
   double span = 0;
   for (const Sweep& s : recorded_.sweeps) span = std::max(span, s.end - s.begin);
-  if (span < 1e-4) {
+  const bool at_once = recorded_.reading.without_deskew;
+  if (span < 1e-4 && !at_once) {
     find({Sensor::lidar,
           "point_times_absent",
           "all points of a sweep have the same time",
           fmt::format("the longest sweep lasts {:.3f} ms by its points", 1e3 * span),
-          "the driver must publish point times (or kilvo run --no-deskew for a LiDAR that measures at once)",
+          "the driver must publish point times (or lidar.deskew: false for a LiDAR that measures at once)",
           span,
           "s",
           {},
@@ -62,7 +63,8 @@ void Examination::examine_point_times() {
   const GyroPath path = gyro();
   Deskew deskew{&path, robot_.lidar.T_imu_lidar.R};
   deskew_first(deskew);
-  if (!earlier_.point_times_are_good) deskew.times = right_point_times(deskew);
+  if (at_once) check(Sensor::lidar, "point times", Check::Verdict::note, "not used: each cloud is taken at its stamp (lidar.deskew)");
+  if (!at_once && !earlier_.point_times_are_good) deskew.times = right_point_times(deskew);
   if (deskew.times != 1) way_ = scan_odometry(recorded_.sweeps, deskew);
   // Once more with the mount and the clock that follow: sweeps taken as rigid shift both a little.
   const MountFit again = fit_mount(turns_of(way_), path, deskew.R_IL, deskew.offset);
@@ -83,7 +85,7 @@ void Examination::examine_point_times() {
                        fit ? fit->g_W : Eigen::Vector3d::Zero(), fit ? fit->ba : Eigen::Vector3d::Zero());
   deskew.way = swung.empty() ? nullptr : &swung;
   deskew.p_IL = T_IL.p;
-  deskew.exact = recorded_.has_all_points;
+  deskew.exact = recorded_.reading.all_points;
   earlier_.swung.extend(recorded_.sweeps, deskew);
   way_ = earlier_.swung.way();
 }
