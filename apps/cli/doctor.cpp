@@ -35,13 +35,11 @@ struct DoctorOptions {
 lab::Recorded record(const DoctorOptions& options, lab::RecordingOptions wanted) {
   wanted.start = options.start;
   wanted.duration = options.duration;
-  const auto read = [&options](const lab::RecordingOptions& what) {
+  const auto read = [&options, without_deskew = wanted.no_deskew](const lab::RecordingOptions& what) {
     lab::RecordingSource source(options.input, what);
-    lab::Recorder recorder(what.leg_clock.has_value(), options.exact);
+    lab::Recorder recorder({what.leg_clock.has_value(), without_deskew, options.exact});
     while (const auto measurement = source.next()) recorder.push(*measurement);
-    for (const Sensor sensor : all_sensors) {
-      if (const std::string text = source.clocks().finding(sensor); !text.empty()) fmt::print(stderr, "kilvo: warning: {}\n", text);
-    }
+    for (const std::string& text : source.warnings()) fmt::print(stderr, "kilvo: warning: {}\n", text);
     return recorder.finish();
   };
   if (!wanted[Sensor::lidar].use) return read(wanted);

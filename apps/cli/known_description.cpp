@@ -47,7 +47,7 @@ Measured measured(std::optional<Time> from, double seconds, const RunOptions& op
   const lab::RecordingOptions wanted = recording_options(options, settings, used);
   lab::RecordingSource source({options.inputs.begin(), options.inputs.end()}, wanted);
   lab::FailingSource failing(source, options.failures, source.begin(), [&source] { return source.recorded(); });
-  lab::Recorder recorder(wanted.leg_clock.has_value(), exact);
+  lab::Recorder recorder({wanted.leg_clock.has_value(), wanted.no_deskew, exact});
   while (const auto measurement = failing.next()) {
     if (to_seconds(stamp_of(*measurement) - from.value_or(source.begin())) > seconds) break;
     recorder.push(*measurement);

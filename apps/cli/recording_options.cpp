@@ -11,12 +11,13 @@ lab::RecordingOptions recording_options(const lab::Settings& settings, const std
   out[Sensor::imu].gyro_scale = settings.robot.imu.gyro_scale;
   if (out[Sensor::legs].use) out[Sensor::legs].joints = lab::leg_joints(settings.robot);
   if (out[Sensor::legs].use && settings.leg_clock.clock != "stamp") out.leg_clock.emplace(settings.leg_clock, settings.robot);
+  out.no_deskew = !settings.clouds.deskew;
   return out;
 }
 
 lab::RecordingOptions recording_options(const RunOptions& options, const lab::Settings& settings, const std::vector<Sensor>& used) {
   lab::RecordingOptions out = recording_options(settings, used);
-  out.no_deskew = options.no_deskew;
+  out.no_deskew |= options.no_deskew;
   out.with_colours = options.with_map;
   out.start = options.start;
   out.duration = options.duration;

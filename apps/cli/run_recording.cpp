@@ -32,11 +32,10 @@
 namespace kilvo::cli {
 namespace {
 
-void tell_start(const RunFacts& facts, const lab::RecordingSource& source, bool no_deskew) {
+void tell_start(const RunFacts& facts, const lab::RecordingSource& source) {
   fmt::print(stderr, "kilvo: configuration {}\n", facts.config_file);
   for (const Sensor sensor : facts.sensors) {
-    std::string detail;
-    if (sensor == Sensor::lidar) detail = no_deskew ? ", each cloud taken at its stamp" : ", point time: " + source.point_time().text();
+    const std::string detail = sensor == Sensor::lidar ? ", " + source.point_time_text() : "";
     fmt::print(stderr, "kilvo: {} from {}{}\n", name_of(sensor), source.topic(sensor), detail);
   }
 }
@@ -64,10 +63,10 @@ class Run {
                           : nullptr),
         skeleton_(options.out / "skeleton.csv", settings_.robot),
         description_(
-            settings_.robot, settings_.leg_clock.clock != "stamp",
+            settings_.robot, {settings_.leg_clock.clock != "stamp", source_.is_without_deskew()},
             options.threads > 1 || options.realtime ? lab::DescriptionWatch::Judging::beside : lab::DescriptionWatch::Judging::here),
         progress_(Progress::style_for(options.quiet)) {
-    if (!options.quiet) tell_start(facts_, source_, options.no_deskew);
+    if (!options.quiet) tell_start(facts_, source_);
   }
 
   /// None: the description is wrong, as wrong() says, and the run has to begin anew.

@@ -40,7 +40,8 @@ Node::Node(const Options& options, const lab::Settings& settings, Outlet outlet,
       base_(options_, settings_),
       states_(options_, settings_, base_, outlet_),
       map_(options_.map_frame, settings_.mapping, outlet_),
-      description_(settings_.robot, settings_.leg_clock.clock != "stamp", lab::DescriptionWatch::Judging::live),
+      description_(settings_.robot, {settings_.leg_clock.clock != "stamp", options_.no_deskew || !settings_.clouds.deskew},
+                   lab::DescriptionWatch::Judging::live),
       inputs_(
           settings_, options_.no_deskew, [this](Measurement m, Time arrived) { push(std::move(m), arrived); }, say_) {
   try {

@@ -28,7 +28,7 @@ SensorInputs::SensorInputs(const lab::Settings& settings, bool no_deskew, Sink s
       lidar_rate_(settings.robot.lidar.rate),
       leg_clock_(settings.leg_clock, settings.robot),
       clocks_(time_offsets_of(settings.robot)) {
-  if (no_deskew) point_time_.emplace();
+  if (no_deskew || !settings.clouds.deskew) point_time_.emplace();
   for (const Sensor sensor : all_sensors) {
     input_of(sensor).topic = settings.topic(sensor);
     input_of(sensor).intake = lab::SensorIntake(time_offsets_of(settings.robot)[index_of(sensor)], settings.robot.imu.gyro_scale, true,

@@ -74,5 +74,37 @@ TEST(SensorInputs, BringStampsOfAnotherEpochOntoTheImusAndSayItOnce) {
   EXPECT_NEAR(static_cast<double>(legs.counts.dropped.at("clock not known yet")), 500, 10);
 }
 
+// As kilvo run does, by the configuration or by the option.
+TEST(SensorInputs, TakeCloudsAtTheirStampWhereTheyAreNotToBeDeskewed) {
+  for (const auto& [deskew, no_deskew, last] : {std::tuple{true, false, 90'000'000}, {false, false, 0}, {true, true, 0}}) {
+    lab::Settings settings = lab::load_settings(KILVO_SOURCE_DIR "/config/robots/sim.yaml");
+    settings.clouds.deskew = deskew;
+    std::vector<LidarScan> scans;
+    const auto keep = [&scans](const Measurement& m, Time) {
+      if (const auto* scan = std::get_if<LidarScan>(&m)) scans.push_back(*scan);
+    };
+    SensorInputs inputs(settings, no_deskew, keep, [](const std::string&) {});
+    const auto receive = [&inputs](const Measurement& m, Time at) {
+      const auto bytes = lab::encode(m, "");
+      inputs.receive(sensor_of(m), {lab::written_type(sensor_of(m)).name, {bytes, lab::Encoding::ros1}, at});
+    };
+    for (int ms = 0; ms < 3000; ms += 5) {
+      const Time t = day + std::chrono::milliseconds(ms);
+      receive(ImuSample{t, {0, 0, 0.1}, {0, 0, 9.81}}, t);
+      if (ms % 100 != 95) continue;
+      LidarScan scan;
+      scan.t = t - std::chrono::milliseconds(95);
+      for (int i = 0; i < 100; ++i) {
+        LidarPoint point{};
+        point.x = 3, point.y = 0.01F * static_cast<float>(i), point.offset_ns = std::min(i, 90) * 1'000'000;
+        scan.points.push_back(point);
+      }
+      receive(scan, t);
+    }
+    ASSERT_GT(scans.size(), 10U);
+    EXPECT_NEAR(scans.back().points.back().offset_ns, last, 1000);
+  }
+}
+
 }  // namespace sensor_inputs_test
 }  // namespace kilvo::node

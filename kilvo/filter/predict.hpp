@@ -33,7 +33,7 @@ struct ProcessNoise {
   double accel = 0.003;          // m/s^2/sqrt(Hz)
   double velocity = 8e-4;        // m/s/sqrt(Hz)
   double gyro_bias = 2e-5;       // rad/s/sqrt(s)
-  double accel_bias = 1e-3;      // m/s^2/sqrt(s)
+  double accel_bias = 7e-4;      // m/s^2/sqrt(s)
   double foot = 0.005;           // m/sqrt(s), of a stance foot, each axis of the foot frame
   double exposure = 0.05;        // 1/sqrt(s)
   double foot_vertical = 0.025;  // m/sqrt(s), of a stance foot against gravity

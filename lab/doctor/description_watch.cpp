@@ -18,13 +18,13 @@ constexpr double backwards = 1;       // s: another recording begins
 
 // What the estimator finds and corrects by itself, or only becomes less accurate by, is a warning.
 bool spoils(const Finding& finding) {
-  constexpr std::array<std::string_view, 25> always{"imu_axes",       "imu_rotated",         "gyro_unit",      "joint_unit",
+  constexpr std::array<std::string_view, 26> always{"imu_axes",       "imu_rotated",         "gyro_unit",      "joint_unit",
                                                     "joints_swapped", "joint_names_shifted", "joint_sign",     "point_times_reversed",
                                                     "lidar_inverted", "lidar_unit",          "imu_link",       "joint_offset",
                                                     "lidar_axes",     "accel_gravity",       "urdf",           "point_times_unit",
                                                     "leg_joints",     "sole_unit",           "joint_velocity", "foot_link",
                                                     "joint_frozen",   "joints_repeated",     "gyro_frozen",    "joint_locked",
-                                                    "lidar_range"};
+                                                    "lidar_range",    "clouds_deskewed"};
   constexpr double lidar_turn = 3, imu_turn = 10, time = 0.08, length = 0.2, place = 0.05;  // degrees, s, -, m
   if (std::ranges::find(always, finding.cause) != always.end()) return true;
   if (finding.cause == "accel_unit") return finding.fatal;
@@ -98,7 +98,7 @@ void DescriptionWatch::take(const Measurement& measurement) {
 void DescriptionWatch::begin(Time t) {
   begin_ = last_ = t;
   if (!origin_) origin_ = t;
-  recorder_ = Recorder(leg_clock_is_found_);
+  recorder_ = Recorder(reading_);
   // What a window in which the robot moved has left open needs all of another one.
   due_ = windows_ == 0 ? 0 : dues.size() - 1;
   turned_ = 0;

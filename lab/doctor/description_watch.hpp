@@ -33,9 +33,8 @@ class DescriptionWatch {
   /// here: in take(); beside: in a thread of its own, the same findings; live: likewise, and take() never waits for it.
   enum class Judging : std::uint8_t { here, beside, live };
 
-  /// `leg_clock_is_found`: by the program, which stamps the legs' samples (legs.clock).
-  DescriptionWatch(const Robot& robot, bool leg_clock_is_found, Judging judging)
-      : robot_(robot), judging_(judging), leg_clock_is_found_(leg_clock_is_found), recorder_(leg_clock_is_found) {}
+  DescriptionWatch(const Robot& robot, const Reading& reading, Judging judging)
+      : robot_(robot), judging_(judging), reading_(reading), recorder_(reading) {}
   /// Each measurement, in the order of arrival; from any thread. Images are not looked at.
   void take(const Measurement& measurement);
   /// What has been found since the last call. Does not wait.
@@ -57,7 +56,7 @@ class DescriptionWatch {
 
   Robot robot_;
   Judging judging_;
-  bool leg_clock_is_found_;
+  Reading reading_;
   std::mutex mutex_;
   Recorder recorder_;
   std::optional<Time> origin_, begin_, last_;

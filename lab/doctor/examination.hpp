@@ -94,7 +94,9 @@ class Examination {
   void turn_with(std::vector<SweepPose> way);
   void examine_point_times();
   void deskew_first(Deskew& deskew);
-  bool point_times_run_backwards(Deskew deskew);
+  // point_times.cpp
+  double right_point_times(Deskew deskew);
+  void accuse_point_times(double times, const Deskew& deskew, const std::string& evidence);
   // lidar_examination.cpp
   void examine_lidar();
   /// Of rotation, clock and gyro bias at once.
@@ -205,6 +207,7 @@ class Examination {
   Earlier earlier_;
   bool described_first_ = false;
   bool deskewed_ = false;               // by the gyro as described, as which the sweeps turn
+  bool point_times_are_open_ = false;   // whether they are right: the motion does not show it
   std::vector<SweepPose> first_, way_;  // the LiDAR's way, so or of rigid sweeps, and with all that the data say
   std::optional<LidarWay> lidar_way_;
   std::vector<Turn> lidar_turns_, leg_turns_;

@@ -392,9 +392,9 @@ TEST(Doctor, AnImuUpsideDownIsNamedThoughRoughEncodersTellNoTurning) {
   EXPECT_THAT(causes(recorded, robot), ElementsAre("imu_mount_rotation"));
 }
 
-std::vector<WrongDescription> watched(const Robot& robot, bool leg_clock_is_found, DescriptionWatch::Judging judging,
+std::vector<WrongDescription> watched(const Robot& robot, const Reading& reading, DescriptionWatch::Judging judging,
                                       const std::function<void(Measurement&)>& change) {
-  DescriptionWatch watch(robot, leg_clock_is_found, judging);
+  DescriptionWatch watch(robot, reading, judging);
   for (Measurement measurement : walked().measurements) {
     change(measurement);
     watch.take(measurement);
@@ -407,7 +407,7 @@ TEST(DescriptionWatch, SaysWhatIsWrongWithinTenSecondsOfData) {
     if (auto* imu = std::get_if<ImuSample>(&m)) imu->gyro *= 57.29577951308232;
   };
   for (const auto judging : {DescriptionWatch::Judging::here, DescriptionWatch::Judging::beside}) {
-    const auto wrong = watched(walked().robot, false, judging, in_degrees);
+    const auto wrong = watched(walked().robot, {}, judging, in_degrees);
     ASSERT_EQ(wrong.size(), 1U);
     EXPECT_EQ(wrong.front().finding.cause, "gyro_unit");
     EXPECT_TRUE(wrong.front().spoils);
@@ -416,7 +416,7 @@ TEST(DescriptionWatch, SaysWhatIsWrongWithinTenSecondsOfData) {
 }
 
 TEST(DescriptionWatch, SaysNothingOfARightDescription) {
-  EXPECT_TRUE(watched(walked().robot, false, DescriptionWatch::Judging::here, [](Measurement&) {}).empty());
+  EXPECT_TRUE(watched(walked().robot, {}, DescriptionWatch::Judging::here, [](Measurement&) {}).empty());
 }
 
 // legs.clock: estimated: the stamps jump once the clock is found, and again when it was the wrong one.
@@ -427,7 +427,7 @@ TEST(DescriptionWatch, DoesNotAccuseAClockThatTheProgramFinds) {
     const double t = to_seconds(legs->t - stamp_of(walked().measurements.front()));
     legs->t += from_seconds(t < 4 ? -0.4 : t < 6 ? 0.35 : 0.1);
   };
-  EXPECT_TRUE(watched(walked().robot, true, DescriptionWatch::Judging::here, jumps).empty());
+  EXPECT_TRUE(watched(walked().robot, {.leg_clock_is_found = true}, DescriptionWatch::Judging::here, jumps).empty());
 }
 
 TEST(DescriptionWatch, WhatMoreDataRefuteIsAWarningAndChangesNothing) {

@@ -89,6 +89,11 @@ void Examination::examine_gyro_scale(const std::vector<Turn>& turns, const Mount
   const auto [scale, sigma] = gyro_scale(turns, gyro(), fit);
   constexpr double tolerance = 0.04;
   if (std::abs(scale - 1) < std::max(tolerance, sure * sigma)) return;
+  // Wrong times of the points make sweeps turn by too much or too little; taken as measured at once they do not.
+  if (point_times_are_open_) {
+    const double rigid = gyro_scale(turns_of(scan_odometry(recorded_.sweeps, {})), gyro(), fit).first;
+    if (std::abs(rigid - 1) < tolerance || (rigid > 1) != (scale > 1)) return;
+  }
   gyro_axes_ /= scale;
   gyro_bias_ /= scale;
   find({Sensor::imu,

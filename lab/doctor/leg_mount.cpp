@@ -133,7 +133,7 @@ void Examination::examine_leg_rotation() {
   Refinement& mount = refinements_.back();
   mount.changes = {{"imu.T_link_imu.R", rotation_text(turned_by(described, mount).inverse())}};
   for (auto* x : {&mount.change, &mount.taken}) std::ranges::transform(*x, x->begin(), std::negate());  // of the mount, not of its inverse
-  if (!recorded_.leg_clock_is_found) refine_offset(Sensor::legs, fit.offset, fit.offset_sigma(), clock_method);
+  if (!recorded_.reading.leg_clock_is_found) refine_offset(Sensor::legs, fit.offset, fit.offset_sigma(), clock_method);
   if (stances.good) {
     refine_zeros(stances);
     examine_feet_apart(start);
@@ -160,7 +160,7 @@ void Examination::examine_leg_rotation() {
 void Examination::examine_leg_clock(const MountFit& fit, double method, double tolerance) {
   const double sigma = std::hypot(fit.offset_sigma(), method);
   const std::string clock = fmt::format("{:.1f} ms against the IMU, standard deviation {:.1f} ms", 1e3 * fit.offset, 1e3 * sigma);
-  if (recorded_.leg_clock_is_found) {
+  if (recorded_.reading.leg_clock_is_found) {
     check(Sensor::legs, "clock", Check::Verdict::note, clock + "; found by the program (legs.clock)");
   } else if (std::abs(fit.offset) < std::max(tolerance, sure * sigma) || fit.explained < 0.6) {
     check(Sensor::legs, "clock", fit.explained < 0.6 ? Check::Verdict::unknown : Check::Verdict::good, clock);

@@ -54,10 +54,11 @@ void Examination::examine_lidar() {
   const std::size_t before = diagnosis_.findings.size();
   examine_point_times();
   const MountFit fit = examine_lidar_rotation();
+  const std::string times = diagnosis_.findings.size() > before ? diagnosis_.findings[before].cause : "";
   // Without times a sweep is taken at its stamp: that half a sweep is missing is no fault of the clock.
-  if (diagnosis_.findings.size() > before && diagnosis_.findings[before].cause == "point_times_absent") return;
-  if (way_.empty()) return;
-  examine_lidar_clock(fit);
+  if (times == "point_times_absent" || way_.empty()) return;
+  // Nor is it that wrong times are of another moment in the middle.
+  if (times != "clouds_deskewed" && times != "point_times_unit") examine_lidar_clock(fit);
   examine_lidar_position();
 }
 
@@ -192,7 +193,8 @@ void Examination::examine_lidar_clock(const MountFit& fit) {
   for (const Sweep& s : recorded_.sweeps) spans.push_back(s.end - s.begin);
   std::ranges::nth_element(spans, spans.begin() + static_cast<std::ptrdiff_t>(spans.size() / 2));
   const double span = spans[spans.size() / 2], period = recorded_.stamps[static_cast<std::size_t>(Sensor::lidar)].period;
-  if (span < 0.7 * period && std::abs(fit.offset - 0.5 * (period - span)) < std::max(0.004, sure * sigma)) {
+  if (!recorded_.reading.without_deskew && span < 0.7 * period &&
+      std::abs(fit.offset - 0.5 * (period - span)) < std::max(0.004, sure * sigma)) {
     find({Sensor::lidar,
           "point_times_unit",
           fmt::format("the points' times span {:.2f} ms of sweeps that take {:.0f} ms", 1e3 * span, 1e3 * period),
@@ -202,6 +204,13 @@ void Examination::examine_lidar_clock(const MountFit& fit) {
           "",
           {},
           true});
+    return;
+  }
+  // Between a quarter and three quarters of a sweep: clouds that are deskewed already are half a sweep off.
+  if (point_times_are_open_ && std::abs(std::abs(fit.offset) - 0.5 * span) < 0.25 * span) {
+    check(Sensor::lidar, "clock", Check::Verdict::unknown,
+          detail + ": so is that of clouds which the driver has deskewed already; more turning would show which it is");
+    seems_wrong(Sensor::lidar) = true;
     return;
   }
   find_offset(Sensor::lidar, fit.offset, sigma, "turning of the sweeps against the gyro's");

@@ -41,7 +41,7 @@ void Recorder::take(const ImuSample& sample) {
 
 void Recorder::take(const JointSample& sample) {
   const double t = seconds(sample.t);
-  if (t - last_leg_ < leg_period && (t >= last_leg_ || (recorded_.leg_clock_is_found && t > last_leg_ - leg_step))) return;
+  if (t - last_leg_ < leg_period && (t >= last_leg_ || (recorded_.reading.leg_clock_is_found && t > last_leg_ - leg_step))) return;
   if (!std::ranges::all_of(sample.position, [](double q) { return std::isfinite(q); })) return;
   if (recorded_.joint_names.empty()) recorded_.joint_names = sample.names;
   if (sample.names.list() != recorded_.joint_names) {
@@ -49,7 +49,7 @@ void Recorder::take(const JointSample& sample) {
     return;
   }
   // Before a clock is found, or once another one is, the stamps are off by something else: only what follows can be judged.
-  if (recorded_.leg_clock_is_found && std::abs(t - last_leg_ - leg_period) > leg_step) recorded_.legs.clear();
+  if (recorded_.reading.leg_clock_is_found && std::abs(t - last_leg_ - leg_period) > leg_step) recorded_.legs.clear();
   last_leg_ = t;
   recorded_.legs.push_back({t, sample.position, sample.velocity});
 }
@@ -58,7 +58,7 @@ void Recorder::take(const LidarScan& scan) {
   if (scan.points.empty()) return;
   Sweep sweep;
   sweep.t = seconds(scan.t);
-  const std::size_t step = recorded_.has_all_points ? 1 : std::max<std::size_t>(1, scan.points.size() / points_of_a_sweep);
+  const std::size_t step = recorded_.reading.all_points ? 1 : std::max<std::size_t>(1, scan.points.size() / points_of_a_sweep);
   std::vector<TimedPoint> points;
   points.reserve(scan.points.size() / (step | 1U) + 1);
   // A step that shares no factor with the number of lines, so that no line is left out.

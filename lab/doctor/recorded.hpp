@@ -42,6 +42,13 @@ struct StampStatistics {
 
 inline constexpr float far_away = 50;  // m: a robot on the ground sees most of what it sees nearer
 
+/// How the program reads the messages.
+struct Reading {
+  bool leg_clock_is_found = false;  // by the program (legs.clock): the legs' stamps are no part of the description
+  bool without_deskew = false;      // all points of a cloud are taken at its stamp (lidar.deskew): that they have no times is no fault
+  bool all_points = false;          // of the sweeps (16 bytes each), to be registered as exactly as they can be: else some thousand
+};
+
 /// Times are seconds since `origin`, the first stamp of all.
 struct Recorded {
   std::int64_t origin = 0;  // ns
@@ -54,8 +61,7 @@ struct Recorded {
   int image_width = 0, image_height = 0;
   std::array<StampStatistics, sensor_count> stamps;
   bool joint_names_change = false;
-  bool leg_clock_is_found = false;  // by the program (legs.clock): the legs' stamps are no part of the description
-  bool has_all_points = false;      // of the sweeps: they are to be registered as exactly as they can be
+  Reading reading;
 };
 
 /// With every so many points of each sweep left.
@@ -64,11 +70,7 @@ Recorded thinned(Recorded recorded, std::size_t step);
 /// Takes measurements in the order in which they arrive.
 class Recorder {
  public:
-  /// `all_points`: of each sweep (16 bytes each), else some thousand. For a calibration.
-  explicit Recorder(bool leg_clock_is_found = false, bool all_points = false) {
-    recorded_.leg_clock_is_found = leg_clock_is_found;
-    recorded_.has_all_points = all_points;
-  }
+  explicit Recorder(const Reading& reading = {}) { recorded_.reading = reading; }
   void push(const Measurement& measurement);
   /// Everything so far, sorted.
   Recorded finish();

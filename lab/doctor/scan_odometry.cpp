@@ -96,8 +96,9 @@ class Odometry final : public SweepRegistration {
     turn(sweep, middle, pose);
     // With the swing taken out it is the place in the middle, else the mean over the sweep.
     const bool mean = velocity_sigma_ == velocity_change;
-    pose.begin = mean ? sweep.begin : middle;
-    pose.end = mean ? sweep.end : middle;
+    const double share = mean ? std::abs(deskew.times) : 0;
+    pose.begin = share == 1 ? sweep.begin : middle + share * (sweep.begin - middle);
+    pose.end = share == 1 ? sweep.end : middle + share * (sweep.end - middle);
     pose.good = first_ || align(pose);
     keep(pose);
     deskew_ = {};  // what it points to may be gone at the next sweep
@@ -164,7 +165,7 @@ class Odometry final : public SweepRegistration {
     }
     for (const TimedPoint& p : *sweep.points) {
       double t = static_cast<double>(p.t);
-      if (deskew_.reversed) t = sum - t;
+      if (deskew_.times != 1) t = 0.5 * sum + deskew_.times * (t - 0.5 * sum);
       const double at = span > 1e-4 ? std::clamp((sweep.t + t - sweep.begin) / span, 0.0, 1.0) * knots : 0;
       const auto k = std::min(static_cast<std::size_t>(at), static_cast<std::size_t>(knots - 1));
       const double share = at - static_cast<double>(k);

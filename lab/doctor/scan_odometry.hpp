@@ -28,7 +28,7 @@ struct Deskew {
   const GyroPath* gyro = nullptr;
   SO3 R_IL;
   double offset = 0;              // s: the LiDAR's stamps plus this are on the IMU's clock
-  bool reversed = false;          // hypothesis: the points' times run backwards within a sweep
+  double times = 1;               // hypothesis: what the points' times, from the middle of the sweep, have to be multiplied by
   const LidarWay* way = nullptr;  // none: constant velocity within a sweep
   Eigen::Vector3d p_IL = Eigen::Vector3d::Zero();
   // Every point is registered, to planes of more of a wall, and none at grazing incidence, where ranges are wrong: several times as long.

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
-#include <span>
 
 #include "lab/doctor/examination.hpp"
 
@@ -10,16 +9,6 @@ namespace kilvo::lab {
 namespace {
 
 constexpr double believable = 0.2;  // m/s, that the acceleration and the way may be apart by
-
-double mean_thickness(std::span<const SweepPose> way) {
-  double sum = 0, n = 0;
-  for (const SweepPose& p : way) {
-    if (!p.good || p.thickness == 0) continue;
-    sum += p.thickness;
-    n += 1;
-  }
-  return n > 0 ? sum / n : INFINITY;
-}
 
 }  // namespace
 
@@ -58,12 +47,13 @@ void Examination::turn_with(std::vector<SweepPose> way) {
 void Examination::examine_point_times() {
   double span = 0;
   for (const Sweep& s : recorded_.sweeps) span = std::max(span, s.end - s.begin);
-  if (span < 1e-4) {
+  const bool at_once = recorded_.reading.without_deskew;
+  if (span < 1e-4 && !at_once) {
     find({Sensor::lidar,
           "point_times_absent",
           "all points of a sweep have the same time",
           fmt::format("the longest sweep lasts {:.3f} ms by its points", 1e3 * span),
-          "the driver must publish point times (or kilvo run --no-deskew for a LiDAR that measures at once)",
+          "the driver must publish point times (or lidar.deskew: false for a LiDAR that measures at once)",
           span,
           "s",
           {},
@@ -73,10 +63,9 @@ void Examination::examine_point_times() {
   const GyroPath path = gyro();
   Deskew deskew{&path, robot_.lidar.T_imu_lidar.R};
   deskew_first(deskew);
-  if (!earlier_.point_times_are_good && point_times_run_backwards(deskew)) {
-    deskew.reversed = true;
-    way_ = scan_odometry(recorded_.sweeps, deskew);
-  }
+  if (at_once) check(Sensor::lidar, "point times", Check::Verdict::note, "not used: each cloud is taken at its stamp (lidar.deskew)");
+  if (!at_once && !earlier_.point_times_are_good) deskew.times = right_point_times(deskew);
+  if (deskew.times != 1) way_ = scan_odometry(recorded_.sweeps, deskew);
   // Once more with the mount and the clock that follow: sweeps taken as rigid shift both a little.
   const MountFit again = fit_mount(turns_of(way_), path, deskew.R_IL, deskew.offset);
   if (!again.fit.good) return;
@@ -96,7 +85,7 @@ void Examination::examine_point_times() {
                        fit ? fit->g_W : Eigen::Vector3d::Zero(), fit ? fit->ba : Eigen::Vector3d::Zero());
   deskew.way = swung.empty() ? nullptr : &swung;
   deskew.p_IL = T_IL.p;
-  deskew.exact = recorded_.has_all_points;
+  deskew.exact = recorded_.reading.all_points;
   earlier_.swung.extend(recorded_.sweeps, deskew);
   way_ = earlier_.swung.way();
 }
@@ -112,55 +101,6 @@ void Examination::deskew_first(Deskew& deskew) {
   deskew.R_IL = fit.fit.good ? fit.R : start;
   deskew.offset = fit.fit.good ? fit.offset : lidar_.offset;
   way_ = scan_odometry(recorded_.sweeps, deskew);
-}
-
-// With the times as they come, or reversed, or without: which leaves the thinnest surfaces.
-bool Examination::point_times_run_backwards(Deskew deskew) {
-  // The stretch that turns most.
-  std::size_t best = 0;
-  double most = -1;
-  constexpr std::size_t stretch = 70;
-  std::vector<double> sums(recorded_.sweeps.size() + 1, 0);
-  for (std::size_t i = 0; i < recorded_.sweeps.size(); ++i) {
-    const Sweep& s = recorded_.sweeps[i];
-    sums[i + 1] = sums[i] + (deskew.gyro->covers(s.begin, s.end) && s.end > s.begin ? deskew.gyro->rate(s.begin, s.end).norm() : 0);
-  }
-  for (std::size_t i = 0; i + stretch < sums.size(); ++i) {
-    if (sums[i + stretch] - sums[i] <= most) continue;
-    most = sums[i + stretch] - sums[i];
-    best = i;
-  }
-  constexpr double clearly = 0.9;
-  const OdometryRange range{best, best + stretch};
-  const double rigid = mean_thickness(scan_odometry(recorded_.sweeps, {}, range));
-  // Times that help would not help the other way round.
-  if (const double with = mean_thickness(std::span(way_).subspan(best, std::min(stretch, way_.size() - best))); with < clearly * rigid) {
-    earlier_.point_times_are_good = true;
-    check(Sensor::lidar, "point times", Check::Verdict::good,
-          fmt::format("surfaces are {:.1f} mm thick with the points' times, {:.1f} mm without", 1e3 * with, 1e3 * rigid));
-    return false;
-  }
-  const double forward = mean_thickness(scan_odometry(recorded_.sweeps, deskew, range));
-  deskew.reversed = true;
-  const double backward = mean_thickness(scan_odometry(recorded_.sweeps, deskew, range));
-  const std::string evidence =
-      fmt::format("surfaces are {:.1f} mm thick with the points' times, {:.1f} mm with reversed ones, {:.1f} mm without", 1e3 * forward,
-                  1e3 * backward, 1e3 * rigid);
-  if (backward < clearly * forward && backward < rigid) {
-    find({Sensor::lidar,
-          "point_times_reversed",
-          "the points' times run backwards within a sweep",
-          evidence,
-          "the driver must publish the time of each point from the beginning of the sweep",
-          0,
-          "",
-          {},
-          true});
-    return true;
-  }
-  earlier_.point_times_are_good = forward <= rigid / clearly;
-  check(Sensor::lidar, "point times", earlier_.point_times_are_good ? Check::Verdict::good : Check::Verdict::note, evidence);
-  return false;
 }
 
 }  // namespace kilvo::lab

@@ -34,6 +34,14 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
     ++counts_.unstamped;
   }
   stamp += from_seconds(time_offset_);
+  if (auto* scan = std::get_if<LidarScan>(&decoded->measurement)) {
+    const std::size_t repeated = repeated_.take_out(*scan);
+    counts_.repeated_points += repeated;
+    if (repeated > 0 && scan->points.empty()) {
+      take_back("repeated");
+      return std::nullopt;
+    }
+  }
   auto* joints = std::get_if<JointSample>(&decoded->measurement);
   if (joints == nullptr) return std::move(decoded->measurement);
   auto whole = assembly_.join(std::move(*joints), arrived);

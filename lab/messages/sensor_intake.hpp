@@ -11,6 +11,7 @@
 #include "lab/messages/encoding.hpp"
 #include "lab/messages/joint_assembly.hpp"
 #include "lab/messages/point_time.hpp"
+#include "lab/messages/repeated_points.hpp"
 
 namespace kilvo::lab {
 
@@ -19,6 +20,7 @@ struct SensorCounts {
   std::uint64_t used = 0;
   std::map<std::string, std::uint64_t> dropped;  // cause -> messages: "undecodable", "too_large"
   std::uint64_t absurd_point_times = 0;          // points, not messages: dropped from their clouds
+  std::uint64_t repeated_points = 0;             // that the message before held as well: dropped too
   std::uint64_t unstamped = 0;                   // used, with the time of their arrival because their stamp is 0
   std::uint64_t unused_parts = 0;                // of leg samples: the others did not come in time
 };
@@ -31,7 +33,8 @@ class SensorIntake {
                         JointNames joints = {})
       : time_offset_(time_offset), gyro_scale_(gyro_scale), with_colours_(with_colours), assembly_(std::move(joints)) {}
 
-  /// Nothing when the message cannot be decoded (newest_fault() says why), or is a part of a leg sample that the others are not there for.
+  /// Nothing when the message cannot be decoded (newest_fault() says why), is a part of a leg sample that the others are not there for, or
+  /// has no point that the scan before did not have.
   /// `arrived`: when the message was recorded, or received. `point_time` matters for LiDAR types only.
   /// `type` is a plain_type_name() that is_type_of() the sensor.
   std::optional<Measurement> take(Sensor sensor, std::string_view type, const WireMessage& message, Time arrived,
@@ -62,6 +65,7 @@ class SensorIntake {
   bool with_colours_;
   JointNames joint_names_;  // of the message that was taken last
   JointAssembly assembly_;
+  RepeatedPoints repeated_;
   SensorCounts counts_;
   std::string first_fault_, newest_fault_;
   std::optional<std::uint32_t> tick_;

@@ -64,6 +64,8 @@ class RecordingSource final : public MeasurementSource {
   const std::string& topic(Sensor s) const { return chosen_[static_cast<std::size_t>(s)].topic; }
   /// How the points' times were found to be written, for the user to read.
   const PointTimeFormat& point_time() const { return point_time_; }
+  bool is_without_deskew() const { return options_.no_deskew; }
+  std::string point_time_text() const { return options_.no_deskew ? "each cloud taken at its stamp" : "point time: " + point_time_.text(); }
 
   /// Which sensors stamp by another clock than the IMU.
   const SensorClocks& clocks() const { return clocks_; }

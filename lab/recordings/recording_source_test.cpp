@@ -220,6 +220,26 @@ TEST(RecordingSource, PointsWithAbsurdTimesAreCountedAndWarnedOf) {
   EXPECT_THAT(source.warnings(), ::testing::ElementsAre("/points: 6 points dropped, whose time is not within 2 s of the stamp"));
 }
 
+TEST(RecordingSource, PointsThatTheCloudBeforeHeldAreUsedOnceAndWarnedOf) {
+  const TemporaryFolder folder;
+  std::vector<LidarPoint> points;  // of three sweeps
+  for (int i = 0; i < 3000; ++i) points.push_back({1.0F + 0.001F * static_cast<float>(i), 2, 3, 0, 100'000 * i});
+  std::vector<Measurement> clouds;
+  for (int i = 0; i < 2; ++i) {
+    const Duration later = std::chrono::milliseconds(100 * i);
+    LidarScan scan{tiny_begin + later, {points.begin() + 1000 * i, points.begin() + 1000 * i + 2000}};
+    for (LidarPoint& p : scan.points) p.offset_ns -= static_cast<std::int32_t>(later.count());
+    clouds.emplace_back(scan);
+  }
+  write_bag(folder / "accumulated.bag", clouds);
+  RecordingSource source(folder / "accumulated.bag", use({Sensor::lidar}));
+  std::vector<std::size_t> sizes;
+  for (const auto& m : drain(source)) sizes.push_back(std::get<LidarScan>(m).points.size());
+  EXPECT_THAT(sizes, ::testing::ElementsAre(2000U, 1000U));
+  ASSERT_EQ(source.warnings().size(), 1U);
+  EXPECT_THAT(source.warnings().front(), ::testing::HasSubstr(": clouds repeat points of the one before: 1000 points used once"));
+}
+
 TEST(RecordingSource, ACutRecordingIsUsedAsFarAsItGoesAndTheOffsetIsNamed) {
   const TemporaryFolder folder;
   write_bag(folder / "walk.bag", tiny_walk());

@@ -98,6 +98,7 @@ std::vector<Setting> list_settings(Settings& s) {
   list.pose("lidar.T_imu_lidar", robot.lidar.T_imu_lidar, "position of the LiDAR in the IMU frame",
             "rotation from the LiDAR to the IMU, row by row");
   list.fields("lidar", robot.lidar);
+  list.fields("lidar", s.clouds);
   list.fields("lidar", s.estimator.lidar);
 
   list.own("camera.topic", topic(Sensor::camera), "-", "topic of the camera; the same with /compressed at its end is found as well");

@@ -14,6 +14,7 @@
 #include "lab/clocks/leg_clock.hpp"
 #include "lab/mapping/map_builder.hpp"
 #include "lab/settings/calibration_config.hpp"
+#include "lab/settings/cloud_config.hpp"
 #include "lab/settings/live_config.hpp"
 
 namespace kilvo::lab {
@@ -28,6 +29,7 @@ struct Settings {
   std::string urdf_file;                         // absolute; robot.urdf is its content
   std::array<std::string, sensor_count> topics;  // by Sensor; empty: this robot does not have it
   LegClockConfig leg_clock;
+  CloudConfig clouds;
   EstimatorConfig estimator;
   MappingConfig mapping;
   CalibrationConfig calibration;
