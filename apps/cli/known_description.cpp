@@ -102,7 +102,12 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
     const lab::Diagnosis longer = measured_after(first, options, mended(known, options, config), used).diagnosis;
     std::vector<WrongDescription> again;
     for (const lab::Finding& f : longer.findings) again.push_back(lab::as_wrong(f, first.t, first.after));
+    // A clock is no reason to doubt the rest, which is then reported alone.
+    const auto is_clock = [](const WrongDescription& w) { return w.finding.cause.ends_with("_clock"); };
+    const auto is_more = [&](const WrongDescription& w) { return known.stops(w) && !is_clock(w); };
+    const bool clocks_alone = std::ranges::none_of(wrong, is_more) && std::ranges::none_of(again, &WrongDescription::spoils);
     if (std::ranges::any_of(again, [&](const WrongDescription& w) { return known.stops(w); })) wrong = again;
+    for (WrongDescription& w : wrong) w.is_mendable &= !clocks_alone || is_clock(w);
     for (WrongDescription& w : wrong) {
       if (lab::is_refuted(w.finding, longer)) lab::refute(w);
     }
@@ -116,8 +121,7 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
       else if (known.stops(w))
         lab::put(known.mended, w.finding.changes);
     }
-    // Beside clocks alone, a description that the data do not contradict is kept.
-    if (std::ranges::any_of(known.mended, [](const lab::Change& c) { return !c.key.ends_with(".time_offset"); })) {
+    if (!known.mended.empty() && !clocks_alone) {
       put_taken(known.mended, measured_after(first, options, mended(known, options, config), used).refinements);
     }
   } else {

@@ -33,7 +33,7 @@ std::optional<Event> Levelling::finish() {
   const SO3 turn = SO3::nearest(Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix());
   if (!is_settled_ && !(sigma_ < LevelGround::known_vertical)) {
     // Knowing one of two directions is better than none. But accelerometers err in step with the robot's steps, which their sigma does
-    // not contain: what is not known well may not contradict a start at rest. Who began on the move guessed.
+    // not contain: what is not known well may not contradict a start at rest. A start on the move has only a guess of the vertical.
     constexpr double nearly_known = 4e-3, guessed = 1e-2, most_sigmas = 3;  // rad, rad, -
     const bool is_better = least_sigma_ < 0.5 * first_sigma_ || sigma_ < std::min(nearly_known, first_sigma_);
     const bool contradicts = first_sigma_ < guessed && turn.Log().norm() > most_sigmas * first_sigma_;

@@ -35,7 +35,7 @@ bool spoils(const Finding& finding) {
   return finding.cause.ends_with("_clock") && std::abs(finding.size) > time;
 }
 
-// A clock that is off by milliseconds is found by the estimator as well, after what it has spoilt by then: the vertical.
+// The estimator finds a clock that is off by milliseconds as well, but not before it has made the vertical wrong.
 bool is_mendable(const Finding& finding) {
   // Legs that are wrong otherwise may fit better with two joints exchanged: that is for a person to decide.
   return !finding.changes.empty() && !finding.cause.ends_with("_rate") && finding.cause != "joints_exchanged";

@@ -64,7 +64,10 @@ void Examination::find_offset(Sensor sensor, double offset, double sigma, const 
                        sensor == Sensor::imu ? "other sensors" : "IMU");
   if (sensor == Sensor::lidar && !recorded_.sweeps.empty()) {
     const double span = recorded_.stamps[static_cast<std::size_t>(Sensor::lidar)].period;
-    if (std::abs(std::abs(offset) - span) < 0.1 * span)
+    if (recorded_.reading.without_deskew) {
+      if (std::abs(offset - 0.5 * span) < 0.1 * span)
+        f.text += ", as of clouds that are measured during a sweep: lidar.deskew: true, if their points have times";
+    } else if (std::abs(std::abs(offset) - span) < 0.1 * span)
       f.text += fmt::format(
           ": by one sweep; the sweeps are stamped at their {}",
           offset < 0 ? "end, while point times count from the stamp" : "beginning, while point times count back from the stamp");

@@ -96,7 +96,7 @@ class Examination {
   void deskew_first(Deskew& deskew);
   // point_times.cpp
   double right_point_times(Deskew deskew);
-  void accuse_point_times(double times, const Deskew& deskew, const std::string& evidence);
+  void find_point_times(double times, const Deskew& deskew, const std::string& evidence);
   // lidar_examination.cpp
   void examine_lidar();
   /// Of rotation, clock and gyro bias at once.

@@ -68,7 +68,7 @@ double thinner_by(const std::vector<SweepPose>& way, const std::vector<SweepPose
 }
 
 /// The sweeps that turn most.
-OdometryRange liveliest(const std::vector<Sweep>& sweeps, const GyroPath& gyro) {
+OdometryRange turning_most(const std::vector<Sweep>& sweeps, const GyroPath& gyro) {
   std::size_t best = 0;
   double most = -1;
   std::vector<double> sums(sweeps.size() + 1, 0);
@@ -96,7 +96,7 @@ double median_span(const std::vector<Sweep>& sweeps) {
 
 // What the times have to be multiplied by, about the middle of a sweep: 1 unless both surfaces and gyro say for sure that it is another.
 double Examination::right_point_times(Deskew deskew) {
-  const OdometryRange range = liveliest(recorded_.sweeps, *deskew.gyro);
+  const OdometryRange range = turning_most(recorded_.sweeps, *deskew.gyro);
   const double span = median_span(recorded_.sweeps), period = recorded_.stamps[index_of(Sensor::lidar)].period;
   // Times of too large a unit. Those of sweeps that overlap span as much, and are right.
   const bool too_long = period > 0 && 0.7 * span > period;
@@ -131,7 +131,7 @@ double Examination::right_point_times(Deskew deskew) {
   constexpr double half = 0.5, likely = 2;  // of the error; standard deviations
   if (best != given && std::isfinite(given->turning_error) && best->turning_error < half * given->turning_error &&
       surer_by(*best, *given) > sure_among(all.size()) && thinner_by(best->way, given->way) > likely) {
-    accuse_point_times(best->times, deskew, evidence);
+    find_point_times(best->times, deskew, evidence);
     return best->times;
   }
   const bool good = mean_thickness(given->way) <= rigid / clearly;
@@ -141,7 +141,7 @@ double Examination::right_point_times(Deskew deskew) {
   return 1;
 }
 
-void Examination::accuse_point_times(double times, const Deskew& deskew, const std::string& evidence) {
+void Examination::find_point_times(double times, const Deskew& deskew, const std::string& evidence) {
   Finding f{Sensor::lidar, {}, {}, evidence, {}, 0, {}, {}, true};
   if (times < 0) {
     f.cause = "point_times_reversed";
@@ -164,7 +164,8 @@ void Examination::accuse_point_times(double times, const Deskew& deskew, const s
     f.text =
         "the clouds are motion-compensated already: with the points' times, which they still have, the motion within a sweep is removed "
         "twice";
-    f.evidence += fmt::format("; taken as measured at once, {:.0f} ms after their stamps, sweeps turn as the gyro does", 1e3 * f.size);
+    f.evidence += fmt::format("; taken as measured at once, {:.0f} ms after their stamps, sweeps turn as the gyro does",
+                              std::round(1e3 * f.size) + 0.0);  // no -0
     f.changes = {{"lidar.deskew", "false"}};
     constexpr double negligible = 0.005;  // s, that the estimator finds and corrects by itself
     if (std::abs(f.size) > negligible) f.changes.push_back({"lidar.time_offset", fmt::format("{:.4f}", robot_.lidar.time_offset + f.size)});

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstdlib>
+#include <limits>
+#include <utility>
 
 namespace kilvo::lab {
 namespace {
 
-constexpr std::uint64_t one_of = 16;              // points are compared
 constexpr std::int64_t same_time = 1000;          // ns: a double holds the time of day to 256 ns
 constexpr std::size_t fewest = 10;                // that are compared, so that it is no chance
 constexpr std::size_t most_by_chance_one_of = 4;  // of those
@@ -24,24 +24,33 @@ std::uint64_t place_of(const LidarPoint& p) {
   return h;
 }
 
+// One of sixteen, by the bits of x.
+bool is_compared(const LidarPoint& p) { return std::bit_cast<std::uint32_t>(p.x) * 0x9e3779b1U >> 28U == 0; }
+
 // Rays without an echo are at the origin, or not finite: alike in every scan.
 bool has_place(const LidarPoint& p) { return p.x * p.x + p.y * p.y + p.z * p.z > 0; }
 
 }  // namespace
 
+// Both lists are walked once: a driver may put all rays without an echo at one place.
 std::size_t RepeatedPoints::take_out(LidarScan& scan) {
   now_.clear();
   const std::int64_t stamp = to_ns(scan.t), until = newest_;
+  std::int32_t last = std::numeric_limits<std::int32_t>::min();
   for (const LidarPoint& p : scan.points) {
-    if (const std::uint64_t place = place_of(p); place % one_of == 0 && has_place(p)) now_.push_back({place, stamp + p.offset_ns});
+    last = std::max(last, p.offset_ns);
+    if (is_compared(p) && has_place(p)) now_.push_back({place_of(p), stamp + p.offset_ns});
   }
-  std::ranges::sort(now_, {}, &Seen::place);
-  const auto is_repeated = [this](const Seen& seen) {
-    const auto same = std::ranges::equal_range(before_, seen.place, {}, &Seen::place);
-    return std::ranges::any_of(same, [&seen](const Seen& other) { return std::abs(other.t - seen.t) < same_time; });
-  };
-  const auto repeated = static_cast<std::size_t>(std::ranges::count_if(now_, is_repeated));
-  if (!scan.points.empty()) newest_ = stamp + offsets_of(scan).last;
+  const auto order = [](const Seen& s) { return std::pair(s.place, s.t); };
+  std::ranges::sort(now_, {}, order);
+  std::size_t repeated = 0;
+  auto other = before_.begin();
+  for (const Seen& seen : now_) {
+    const std::pair earliest(seen.place, seen.t - same_time + 1);
+    while (other != before_.end() && order(*other) < earliest) ++other;
+    if (other != before_.end() && other->place == seen.place && other->t < seen.t + same_time) ++repeated;
+  }
+  if (!scan.points.empty()) newest_ = stamp + last;
   std::swap(before_, now_);
   if (repeated < fewest || repeated * most_by_chance_one_of < before_.size()) return 0;
   scan.offsets.reset();

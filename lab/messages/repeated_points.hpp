@@ -20,7 +20,7 @@ class RepeatedPoints {
     std::int64_t t;       // ns
   };
 
-  std::vector<Seen> before_, now_;  // a share of the points, chosen by their place, sorted by it
+  std::vector<Seen> before_, now_;  // a share of the points, chosen by their place, sorted by it and by time
   std::int64_t newest_ = 0;         // ns, of the scan before
 };
 

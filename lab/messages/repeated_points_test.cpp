@@ -9,7 +9,7 @@ namespace repeated_points_test {
 constexpr std::size_t points = 5000;
 constexpr std::int32_t interval = 100'000'000;  // ns
 
-/// The k-th scan of a LiDAR: each measures other points, some rays come back from nowhere.
+/// The k-th scan of a LiDAR: each measures other points, some rays are without an echo.
 std::vector<LidarPoint> scan_of(int k) {
   std::mt19937 random(static_cast<unsigned>(k));
   std::uniform_real_distribution<float> place(-10, 10);
@@ -72,6 +72,18 @@ TEST(RepeatedPoints, TheSamePlacesMeasuredAgainAreLeftAlone) {
     LidarScan scan = message(10, 1);
     scan.t += Duration(interval) * k;
     EXPECT_EQ(repeated.take_out(scan), 0U);
+  }
+}
+
+// A driver that puts rays without an echo at one place, which is compared. Pairs of them would be 10^10.
+TEST(RepeatedPoints, ManyPointsAtOnePlaceAreNoWork) {
+  for (int place = 1; place <= 64; ++place) {
+    RepeatedPoints repeated;
+    for (int k = 0; k < 2; ++k) {
+      LidarScan scan{Time{} + std::chrono::seconds(1'700'000'000 + k), {}};
+      scan.points.assign(100'000, LidarPoint{0.01F * static_cast<float>(place), 0, 0, 0, 0});
+      EXPECT_EQ(repeated.take_out(scan), 0U);
+    }
   }
 }
 
