@@ -96,6 +96,7 @@ class Examination {
   void deskew_first(Deskew& deskew);
   // point_times.cpp
   double right_point_times(Deskew deskew);
+  double median_duration() const;  // s, of the sweeps by their points
   void find_point_times(double times, const Deskew& deskew, const std::string& evidence);
   // lidar_examination.cpp
   void examine_lidar();
@@ -206,9 +207,9 @@ class Examination {
   Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();  // rad/s, by the LiDAR
   Earlier earlier_;
   bool described_first_ = false;
-  bool deskewed_ = false;               // by the gyro as described, as which the sweeps turn
-  bool point_times_are_open_ = false;   // whether they are right: the motion does not show it
-  std::vector<SweepPose> first_, way_;  // the LiDAR's way, so or of rigid sweeps, and with all that the data say
+  bool deskewed_ = false;                   // by the gyro as described, as which the sweeps turn
+  bool point_times_are_undecided_ = false;  // whether they are right: the motion does not show it
+  std::vector<SweepPose> first_, way_;      // the LiDAR's way, so or of rigid sweeps, and with all that the data say
   std::optional<LidarWay> lidar_way_;
   std::vector<Turn> lidar_turns_, leg_turns_;
   SenseAgreement lidar_, legs_;

@@ -91,7 +91,7 @@ void Examination::examine_gyro_scale(const std::vector<Turn>& turns, const Mount
   const double tolerance = recorded_.reading.without_deskew ? 0.2 : 0.04;
   if (std::abs(scale - 1) < std::max(tolerance, sure * sigma)) return;
   // Wrong times of the points make sweeps turn by too much or too little; taken as measured at once they do not.
-  if (point_times_are_open_) {
+  if (point_times_are_undecided_) {
     const double rigid = gyro_scale(turns_of(scan_odometry(recorded_.sweeps, {})), gyro(), fit).first;
     if (std::abs(rigid - 1) < tolerance || (rigid > 1) != (scale > 1)) return;
   }

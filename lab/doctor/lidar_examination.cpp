@@ -57,7 +57,7 @@ void Examination::examine_lidar() {
   const std::string times = diagnosis_.findings.size() > before ? diagnosis_.findings[before].cause : "";
   // Without times a sweep is taken at its stamp: that half a sweep is missing is no fault of the clock.
   if (times == "point_times_absent" || way_.empty()) return;
-  // Nor is it that wrong times are of another moment in the middle.
+  // Wrong times move the middle of a sweep: that is no fault of the clock either.
   if (times != "clouds_deskewed" && times != "point_times_unit") examine_lidar_clock(fit);
   examine_lidar_position();
 }
@@ -189,10 +189,7 @@ void Examination::examine_lidar_clock(const MountFit& fit) {
     return;
   }
   // Times of too small a unit leave the middle of a sweep too early by half of what they leave out.
-  std::vector<double> spans;
-  for (const Sweep& s : recorded_.sweeps) spans.push_back(s.end - s.begin);
-  std::ranges::nth_element(spans, spans.begin() + static_cast<std::ptrdiff_t>(spans.size() / 2));
-  const double span = spans[spans.size() / 2], period = recorded_.stamps[static_cast<std::size_t>(Sensor::lidar)].period;
+  const double span = median_duration(), period = recorded_.stamps[static_cast<std::size_t>(Sensor::lidar)].period;
   if (!recorded_.reading.without_deskew && span < 0.7 * period &&
       std::abs(fit.offset - 0.5 * (period - span)) < std::max(0.004, sure * sigma)) {
     find({Sensor::lidar,
@@ -207,7 +204,7 @@ void Examination::examine_lidar_clock(const MountFit& fit) {
     return;
   }
   // Between a quarter and three quarters of a sweep: clouds that are deskewed already are half a sweep off.
-  if (point_times_are_open_ && std::abs(std::abs(fit.offset) - 0.5 * span) < 0.25 * span) {
+  if (point_times_are_undecided_ && std::abs(std::abs(fit.offset) - 0.5 * span) < 0.25 * span) {
     check(Sensor::lidar, "clock", Check::Verdict::unknown,
           detail + ": so is that of clouds which the driver has deskewed already; more turning would show which it is");
     seems_wrong(Sensor::lidar) = true;

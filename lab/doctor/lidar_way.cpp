@@ -23,13 +23,6 @@ Eigen::Vector3d accel_at(double t, std::vector<InertialSample>::const_iterator i
   return (1 - share) * before->accel + share * it->accel;
 }
 
-double median(std::vector<double> x) {
-  if (x.empty()) return 0;
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::ranges::nth_element(x, middle);
-  return *middle;
-}
-
 // The random walk of a velocity and its place.
 Eigen::Matrix2d walk(double density, double dt) {
   Eigen::Matrix2d Q;
@@ -158,7 +151,7 @@ void smooth_rotations(std::vector<LidarWay::Pose>& run, const GyroPath& gyro) {
     std::vector<double> z(n), steps;
     for (std::size_t k = 0; k < n; ++k) z[k] = turned[k][axis];
     for (std::size_t k = 1; k < n; ++k) steps.push_back(std::abs(z[k] - z[k - 1]));
-    z = smooth_walk(z, dt, std::max(5e-5, 1.48 * median(steps) / std::sqrt(2.0)), gyro_density);
+    z = smooth_walk(z, dt, std::max(5e-5, 1.48 * median_of(steps) / std::sqrt(2.0)), gyro_density);
     for (std::size_t k = 0; k < n; ++k) turned[k][axis] = z[k];
   }
   for (std::size_t k = 0; k < n; ++k) run[k].T_WI.R = SO3::Exp(turned[k]) * by_gyro[k];

@@ -84,20 +84,18 @@ OdometryRange turning_most(const std::vector<Sweep>& sweeps, const GyroPath& gyr
   return {best, best + stretch};
 }
 
-double median_span(const std::vector<Sweep>& sweeps) {
-  std::vector<double> spans;
-  for (const Sweep& s : sweeps) spans.push_back(s.end - s.begin);
-  const auto middle = spans.begin() + static_cast<std::ptrdiff_t>(spans.size() / 2);
-  std::ranges::nth_element(spans, middle);
-  return *middle;
-}
-
 }  // namespace
+
+double Examination::median_duration() const {
+  std::vector<double> durations;
+  for (const Sweep& s : recorded_.sweeps) durations.push_back(s.duration());
+  return median_of(durations);
+}
 
 // What the times have to be multiplied by, about the middle of a sweep: 1 unless both surfaces and gyro say for sure that it is another.
 double Examination::right_point_times(Deskew deskew) {
   const OdometryRange range = turning_most(recorded_.sweeps, *deskew.gyro);
-  const double span = median_span(recorded_.sweeps), period = recorded_.stamps[index_of(Sensor::lidar)].period;
+  const double span = median_duration(), period = recorded_.stamps[index_of(Sensor::lidar)].period;
   // Times of too large a unit. Those of sweeps that overlap span as much, and are right.
   const bool too_long = period > 0 && 0.7 * span > period;
   std::vector<Hypothesis> all{{1, "with the points' times"}, {0, "without"}, {-1, "with reversed ones"}};
@@ -108,7 +106,7 @@ double Examination::right_point_times(Deskew deskew) {
   };
   all[1].way = way(0);
   const double rigid = mean_thickness(all[1].way);
-  // Times that help would not help the other way round.
+  // Times that make surfaces thinner would make them thicker if they were reversed.
   const double with = mean_thickness(std::span(way_).subspan(range.begin, std::min(stretch, way_.size() - range.begin)));
   if (!too_long && with < clearly * rigid) {
     earlier_.point_times_are_good = true;
@@ -136,7 +134,7 @@ double Examination::right_point_times(Deskew deskew) {
   }
   const bool good = mean_thickness(given->way) <= rigid / clearly;
   earlier_.point_times_are_good = good && best == given;
-  point_times_are_open_ = !earlier_.point_times_are_good;
+  point_times_are_undecided_ = !earlier_.point_times_are_good;
   check(Sensor::lidar, "point times", good ? Check::Verdict::good : Check::Verdict::note, evidence);
   return 1;
 }
@@ -148,7 +146,7 @@ void Examination::find_point_times(double times, const Deskew& deskew, const std
     f.text = "the points' times run backwards within a sweep";
     f.remedy = "the driver must publish the time of each point from the beginning of the sweep";
   } else if (times > 0) {
-    const double span = median_span(recorded_.sweeps), period = recorded_.stamps[index_of(Sensor::lidar)].period;
+    const double span = median_duration(), period = recorded_.stamps[index_of(Sensor::lidar)].period;
     f.cause = "point_times_unit";
     f.text = fmt::format("the points' times span {:.0f} ms of sweeps that take {:.0f} ms", 1e3 * span, 1e3 * period);
     f.remedy = "the driver must publish the points' times in the unit of their field";
@@ -156,10 +154,8 @@ void Examination::find_point_times(double times, const Deskew& deskew, const std
   } else {
     std::vector<double> after;  // s from the stamp to the middle
     for (const Sweep& s : recorded_.sweeps) after.push_back(0.5 * (s.begin + s.end) - s.t);
-    const auto middle = after.begin() + static_cast<std::ptrdiff_t>(after.size() / 2);
-    std::ranges::nth_element(after, middle);
     f.cause = "clouds_deskewed";
-    f.size = *middle + deskew.offset;
+    f.size = median_of(after) + deskew.offset;
     f.unit = "s";
     f.text =
         "the clouds are motion-compensated already: with the points' times, which they still have, the motion within a sweep is removed "

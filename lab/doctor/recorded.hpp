@@ -22,6 +22,7 @@ struct Sweep {
   double t = 0;                                           // s, stamp
   double begin = 0, end = 0;                              // s, of the first and the last point
   std::shared_ptr<const std::vector<TimedPoint>> points;  // shared by copies
+  double duration() const { return end - begin; }
 };
 
 struct InertialSample {

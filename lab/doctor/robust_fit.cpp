@@ -121,4 +121,11 @@ Fit robust_fit(const ResidualFunction& residuals, const Eigen::VectorXd& start, 
   return out;
 }
 
+double median_of(std::vector<double> x) {
+  if (x.empty()) return 0;
+  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  std::ranges::nth_element(x, middle);
+  return *middle;
+}
+
 }  // namespace kilvo::lab

@@ -44,6 +44,8 @@ using DerivativeFunction = std::function<void(const Eigen::VectorXd&, Derivative
 Fit robust_fit(const ResidualFunction& residuals, const Eigen::VectorXd& start, const Eigen::VectorXd& prior_sigma,
                const Eigen::VectorXd& step, int iterations = 12, const DerivativeFunction& derivative = nullptr);
 
+/// The middle one, of an even number the upper; 0 of none.
+double median_of(std::vector<double> x);
 /// Robust standard deviation of a row: of the median of the groups' lengths.
 double scale_of(const Residuals& r);
 

@@ -97,6 +97,7 @@ class Odometry final : public SweepRegistration {
     // With the swing taken out it is the place in the middle, else the mean over the sweep.
     const bool mean = velocity_sigma_ == velocity_change;
     const double share = mean ? std::abs(deskew.times) : 0;
+    // Times as they come are kept to the last bit.
     pose.begin = share == 1 ? sweep.begin : middle + share * (sweep.begin - middle);
     pose.end = share == 1 ? sweep.end : middle + share * (sweep.end - middle);
     pose.good = first_ || align(pose);

@@ -46,13 +46,6 @@ Eigen::Matrix3d orthogonal_of(const Eigen::Matrix3d& C) {
   return svd.matrixU() * svd.matrixV().transpose();
 }
 
-double median_of(std::vector<double> x) {
-  if (x.empty()) return 0;
-  const auto middle = x.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
-  std::ranges::nth_element(x, middle);
-  return *middle;
-}
-
 // Outliers count as much as nine tenths of the rows allow.
 double robust_share(std::vector<double>& errors, std::vector<double>& sizes) {
   if (errors.size() < fewest_intervals) return 0;
