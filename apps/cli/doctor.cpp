@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "apps/cli/exit_code.hpp"
+#include "apps/cli/lidar_mount.hpp"
 #include "apps/cli/output_folder.hpp"
 #include "apps/cli/recording_options.hpp"
 #include "apps/cli/sensor_choice.hpp"
@@ -110,10 +111,21 @@ int doctor(const DoctorOptions& options) {
   return diagnosis.unknown() ? unusable_input : done;
 }
 
+/// By the estimator, which knows the LiDAR's way better than the judgement of the description does.
+void refine_by_estimator(Judged& judged, const SO3& described, const DoctorOptions& options) {
+  if (!judged.diagnosis.good()) return;
+  lab::RecordingOptions wanted = recording_options(judged.settings, {Sensor::imu, Sensor::lidar});
+  wanted.start = options.start;
+  fmt::print(stderr, "kilvo: measuring the position of the LiDAR on the IMU by a run on these two\n");
+  lab::RecordingSource source(options.input, wanted);
+  refine_lidar_position(judged.refinements, described, judged.settings, source, options.duration);
+}
+
 /// Mends what is too large to be refined, each time by what the settings before left.
 Judged mend_first(DoctorOptions& options, std::vector<lab::Finding>& mended) {
   constexpr int most_rounds = 4;
   Judged judged = judge(options);
+  const SO3 described = judged.settings.robot.lidar.T_imu_lidar.R;
   for (int round = 1; !judged.diagnosis.good() && round < most_rounds; ++round) {
     const auto& findings = judged.diagnosis.findings;
     if (std::ranges::any_of(findings, [](const lab::Finding& f) { return f.changes.empty(); })) break;
@@ -124,6 +136,7 @@ Judged mend_first(DoctorOptions& options, std::vector<lab::Finding>& mended) {
     }
     judged = judge(options);
   }
+  refine_by_estimator(judged, described, options);
   return judged;
 }
 
@@ -149,7 +162,9 @@ int calibrate(DoctorOptions options) {
     override_with(options, refined);
     page.config = judged.config.string();
     page.before = judged.refinements;
-    page.after = judge(options).refinements;
+    Judged after = judge(options);
+    refine_by_estimator(after, after.settings.robot.lidar.T_imu_lidar.R, options);
+    page.after = after.refinements;
     write_text_file(fs::path(options.report) / "calibration.html", lab::to_html(page));
   }
   return judged.refinements.empty() ? unusable_input : done;

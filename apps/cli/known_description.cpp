@@ -6,6 +6,7 @@
 #include <optional>
 #include <string_view>
 
+#include "apps/cli/lidar_mount.hpp"
 #include "apps/cli/recording_options.hpp"
 #include "lab/doctor/examination.hpp"
 #include "lab/simulation/failures.hpp"
@@ -79,8 +80,13 @@ KnownDescription refined(const lab::Settings& settings, const RunOptions& option
   constexpr int most_rounds = 3;
   KnownDescription known;
   for (int round = 0; round < most_rounds; ++round) {
-    const Measured now = measured(std::nullopt, refined_by, options, mended(known, options, config), used, true);
+    const lab::Settings described = mended(known, options, config);
+    Measured now = measured(std::nullopt, refined_by, options, described, used, true);
     if (now.diagnosis.good()) {
+      const lab::RecordingOptions wanted = recording_options(options, described, {Sensor::imu, Sensor::lidar});
+      lab::RecordingSource source({options.inputs.begin(), options.inputs.end()}, wanted);
+      lab::FailingSource failing(source, options.failures, source.begin(), [&source] { return source.recorded(); });
+      refine_lidar_position(now.refinements, settings.robot.lidar.T_imu_lidar.R, described, failing, refined_by);
       put_taken(known.refined, now.refinements);
       return known;
     }

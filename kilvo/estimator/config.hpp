@@ -46,7 +46,8 @@ struct EstimatorConfig {
   bool gravity_align = true;
   std::string settling = "legs";  // legs | all | none
   int threads = 1;
-  bool sweep_points = true;  // outputs of sweeps carry their points; no setting: the program knows whether anything reads them
+  bool sweep_points = true;    // outputs of sweeps carry their points; no setting: the program knows whether anything reads them
+  bool sweep_updates = false;  // likewise, how they changed the estimate
 
   InitialConfig initial;
   ProcessNoise noise;

@@ -28,6 +28,12 @@ struct StageTimes {
   double visual_us = 0;  // of an image
 };
 
+/// How a sweep changed the estimate, and by what it was predicted (Replay::samples).
+struct SweepUpdate {
+  Estimate from, prior, posterior;
+  std::vector<ImuSample> imu;
+};
+
 struct Output {
   Time t{};
   std::uint32_t epoch = 0;  // grows when the time went back and everything restarted: another world, another time
@@ -49,6 +55,7 @@ struct Output {
   // Only of sweeps:
   std::vector<PointXYZI> points_W;  // undistorted, in the world; empty unless EstimatorConfig::sweep_points or a camera wants them
   RegistrationReport registration;
+  std::optional<SweepUpdate> update;  // where EstimatorConfig::sweep_updates wants it, and the nearest planes were taken
   // Only of images:
   std::vector<ColouredPoint> coloured;  // points of the map that it sees, exposure-corrected
 };

@@ -38,6 +38,8 @@ class Replay {
   /// Density of the accelerometer's noise as it is taken, m/s^2/sqrt(Hz): that of the settings, or more when the samples show it.
   double accel_noise() const { return noise_now().accel; }
 
+  /// All that are remembered.
+  std::vector<ImuSample> samples() const { return {imu_.begin(), imu_.end()}; }
   bool has_imu() const { return !imu_.empty(); }
   const ImuSample& newest_imu() const { return imu_.back(); }
   /// The stamp of the newest IMU sample that is not after t; before all times when there is none.

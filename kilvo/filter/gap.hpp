@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "kilvo/filter/state.hpp"
-#include "kilvo/sensors/silence.hpp"
+#include "kilvo/sensors/time.hpp"
 
 namespace kilvo {
 

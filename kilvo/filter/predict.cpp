@@ -53,11 +53,10 @@ ForceJacobians jacobians_of(const State& x, const Motion& m) {
   return j;
 }
 
-constexpr int moving = 9;  // rows of the error state that an interval moves: R, p, v
-using MovingRows = Eigen::Matrix<double, moving, at::size, Eigen::RowMajor>;
+constexpr int moving = Transition::RowsAtCompileTime;
 
 // P becomes F P F', where F is the identity below its first rows. Each row of F P is a sum of columns of P, which is symmetric.
-void move(const MovingRows& F, Covariance& P) {
+void move(const Transition& F, Covariance& P) {
   Eigen::Matrix<double, at::size, moving> out;
   Eigen::Matrix<double, moving, moving> N = Eigen::Matrix<double, moving, moving>::Zero();  // F P F' of those rows
   project_rows(P, F.data(), moving, N.data(), out.data());
@@ -107,7 +106,7 @@ ImuInterval ImuInterval::between(const ImuSample& a, const ImuSample& b, Time be
 
 State predict_mean(const State& x, const ImuInterval& interval) { return mean_after(x, motion_of(x, interval)); }
 
-void carry(Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise) {
+void carry(Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise, Transition* kept) {
   assert(interval.begin == e.t && interval.end >= interval.begin);
   const Motion m = motion_of(e.x, interval);
   const ForceJacobians j = jacobians_of(e.x, m);
@@ -117,7 +116,7 @@ void carry(Estimate& e, const ImuInterval& interval, const FootOrientations& fee
   const Eigen::Matrix3d R0 = e.x.R.matrix();
   const Eigen::Matrix3d& R1 = m.R1.matrix();
   const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-  MovingRows F = MovingRows::Zero();
+  Transition F = Transition::Zero();
   F.block<3, 3>(at::R, at::R) = m.turn.matrix().transpose();
   F.block<3, 3>(at::R, at::bg) = -j.Jr * dt;
   F.block<3, 3>(at::p, at::R) = dt2 * (j.f0_theta / 3.0 + j.f1_theta / 6.0);
@@ -135,6 +134,7 @@ void carry(Estimate& e, const ImuInterval& interval, const FootOrientations& fee
   // the accelerometer's bias the mean holds the sum.
   if (interval.made_biases) F.middleCols<at::pcl - at::bg>(at::bg).setZero();
   move(F, e.P);
+  if (kept != nullptr) *kept = F;
   add_process_noise(e.P, m, -e.x.g.normalized(), feet, noise, interval);
   e.t = interval.end;
   e.x = mean_after(e.x, m);

@@ -57,8 +57,11 @@ struct ProcessNoise {
 /// R_I,foot of each stance foot; none for a foot that does not stand (its contact position is then not in use).
 using FootOrientations = std::array<std::optional<SO3>, 2>;
 
+/// How the error of R, p and v depends on all errors before.
+using Transition = Eigen::Matrix<double, 9, at::size, Eigen::RowMajor>;
+
 /// Moves the estimate from interval.begin to interval.end. `e.t` must be interval.begin and the interval not negative.
-void carry(Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise);
+void carry(Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise, Transition* kept = nullptr);
 
 /// The mean alone.
 State predict_mean(const State& x, const ImuInterval& interval);

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "kilvo/input/timeline.hpp"
-#include "kilvo/sensors/silence.hpp"
+#include "kilvo/sensors/time.hpp"
 
 namespace kilvo {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "kilvo/sensors/silence.hpp"
+#include "kilvo/sensors/time.hpp"
 
 namespace kilvo {
 

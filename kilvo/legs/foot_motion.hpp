@@ -6,7 +6,7 @@
 
 #include "kilvo/filter/state.hpp"
 #include "kilvo/legs/leg_kinematics.hpp"
-#include "kilvo/sensors/silence.hpp"
+#include "kilvo/sensors/time.hpp"
 
 namespace kilvo {
 

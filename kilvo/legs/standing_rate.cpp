@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kilvo/sensors/silence.hpp"
+#include "kilvo/sensors/time.hpp"
 
 namespace kilvo {
 namespace {

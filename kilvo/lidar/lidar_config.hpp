@@ -1,6 +1,7 @@
 // Settings of the LiDAR measurement.
 #pragma once
 
+#include <Eigen/Core>
 #include <tuple>
 
 #include "kilvo/math/field.hpp"
@@ -39,5 +40,12 @@ struct LidarConfig {
               "reported sigmas allow for a LiDAR that is not mounted quite as described; false: the mount is known exactly"}};
   }
 };
+
+/// Of a point, range noise along the beam and bearing noise across it: n' C n along a unit vector n of that covariance C, m^2. `beam`: from
+/// the LiDAR to the point, m, same frame as n.
+inline double point_noise_along(const Eigen::Vector3d& n, const Eigen::Vector3d& beam, const LidarConfig& config) {
+  const double range2 = beam.squaredNorm(), cosine2 = n.dot(beam) * n.dot(beam) / range2;
+  return config.range_noise * config.range_noise * cosine2 + config.angle_noise * config.angle_noise * range2 * (1 - cosine2);
+}
 
 }  // namespace kilvo

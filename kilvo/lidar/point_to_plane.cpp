@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "kilvo/lidar/outer_sum.hpp"
-#include "kilvo/lidar/point_noise.hpp"
 
 namespace kilvo {
 namespace {

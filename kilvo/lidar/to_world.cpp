@@ -30,7 +30,7 @@ struct Symmetric4 {
   }
 }
 
-// Range noise along the beam, bearing noise across it, as in point_noise.hpp.
+// Range noise along the beam, bearing noise across it, as in lidar_config.hpp.
 [[gnu::always_inline]] inline void noise_of(const Vector4& beam, const LidarConfig& config, Symmetric4& out) {
   const Double4* b = beam.at;
   const Double4 range2 = b[0] * b[0] + (b[1] * b[1] + b[2] * b[2]), across = config.angle_noise * config.angle_noise * range2;

@@ -26,4 +26,9 @@ inline Duration from_seconds(double s) { return Duration(std::llround(s * 1e9));
 constexpr Time time_from_ns(std::int64_t ns) { return Time(Duration(ns)); }
 constexpr std::int64_t to_ns(Time t) { return t.time_since_epoch().count(); }
 
+/// After an IMU gap longer than this nothing is known of the motion in between but that it was a walking robot's, s.
+inline constexpr double blind_gap = 0.1;
+/// A sensor that comes often is missed when it has been silent for longer.
+inline constexpr Duration least_silence = std::chrono::milliseconds(50);
+
 }  // namespace kilvo

@@ -10,6 +10,7 @@
 #include "lab/doctor/finding.hpp"
 #include "lab/doctor/leg_acceleration.hpp"
 #include "lab/doctor/leg_path.hpp"
+#include "lab/doctor/mount_regression.hpp"
 #include "lab/doctor/recorded.hpp"
 #include "lab/doctor/refinement.hpp"
 #include "lab/doctor/scan_odometry.hpp"
@@ -224,6 +225,13 @@ class Examination {
   Diagnosis diagnosis_;
   std::vector<Refinement> refinements_;
 };
+
+/// Of the LiDAR on the IMU: `error` (measured less described) with its standard deviations, m, and what the method is off by besides.
+inline constexpr const char* lidar_position = "position of the LiDAR on the IMU";
+Refinement refined_lidar_position(const Eigen::Vector3d& described, const Eigen::Vector3d& error, const Eigen::Vector3d& sigma,
+                                  double method);
+/// `turned`: see expected_shift.
+Refinement refined_lidar_position(const Eigen::Vector3d& described, const MountMeasurement& measured, const Eigen::Vector3d& turned);
 
 /// From each sweep to the next, where both are registered.
 std::vector<Turn> turns_of(const std::vector<SweepPose>& way);

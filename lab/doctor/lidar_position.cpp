@@ -18,6 +18,24 @@ constexpr double sure_of_position = 8;
 
 }  // namespace
 
+Refinement refined_lidar_position(const Eigen::Vector3d& described, const Eigen::Vector3d& error, const Eigen::Vector3d& sigma,
+                                  double method) {
+  constexpr double largest = 0.01;  // m
+  Refinement r = refinement(Sensor::lidar, lidar_position, {error.x(), error.y(), error.z()}, {sigma.x(), sigma.y(), sigma.z()}, method,
+                            largest, fmt::format("m"));
+  r.changes = {{"lidar.T_imu_lidar.p", vector_text(described + r.taken_vector())}};
+  return r;
+}
+
+Refinement refined_lidar_position(const Eigen::Vector3d& described, const MountMeasurement& measured, const Eigen::Vector3d& turned) {
+  constexpr double method = 0.001;  // m
+  Refinement r = refined_lidar_position(described, measured.error.tail<3>(), measured.covariance.diagonal().tail<3>().cwiseSqrt(), method);
+  const Eigen::Vector3d taken = r.observable ? expected_shift(measured, turned).value_or(Eigen::Vector3d::Zero()) : Eigen::Vector3d::Zero();
+  r.taken = {taken.x(), taken.y(), taken.z()};
+  r.changes = {{"lidar.T_imu_lidar.p", vector_text(described + taken)}};
+  return r;
+}
+
 void Examination::examine_lidar_position() {
   if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "accel_gravity"; })) {
     check(Sensor::lidar, "position of the mount", Check::Verdict::unknown, "the acceleration is not what was measured");
@@ -36,11 +54,8 @@ void Examination::examine_lidar_position() {
   const TranslationFit& fit = *translation_;
   const Eigen::Vector3d described = robot_.lidar.T_imu_lidar.p, error = fit.r - described;
   const Eigen::Vector3d sigma(fit.sigma_r(0), fit.sigma_r(1), fit.sigma_r(2));
-  constexpr double method = 0.002, largest = 0.01;  // m: with it, 20 walks are off by what is predicted
-  Refinement r = refinement(Sensor::lidar, "position of the LiDAR on the IMU", {error.x(), error.y(), error.z()},
-                            {sigma.x(), sigma.y(), sigma.z()}, method, largest, fmt::format("m"));
-  r.changes = {{"lidar.T_imu_lidar.p", vector_text(described + r.taken_vector())}};
-  refinements_.push_back(std::move(r));
+  constexpr double method = 0.002;  // m: with it, 20 walks are off by what is predicted
+  refinements_.push_back(refined_lidar_position(described, error, sigma, method));
   bool wrong = false;
   for (int i = 0; i < 3; ++i) wrong |= std::abs(error[i]) > std::max(position_tolerance, sure_of_position * sigma[i]);
   const std::string detail =

@@ -1,4 +1,4 @@
-#include "kilvo/lidar/point_noise.hpp"
+#include "kilvo/lidar/lidar_config.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include "tests/helpers/random.hpp"
 
 namespace kilvo {
-namespace point_noise_test {
+namespace lidar_config_test {
 
 const LidarConfig config;
 
@@ -28,5 +28,5 @@ TEST(PointNoise, AlongANormalIsTheQuadraticForm) {
   }
 }
 
-}  // namespace point_noise_test
+}  // namespace lidar_config_test
 }  // namespace kilvo
