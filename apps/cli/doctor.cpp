@@ -81,6 +81,7 @@ struct Judged {
   lab::Settings settings;
   lab::Diagnosis diagnosis;
   std::vector<lab::Refinement> refinements;
+  bool without_deskew = false;  // it was read so
 };
 
 Judged judge(const DoctorOptions& options) {
@@ -92,7 +93,7 @@ Judged judge(const DoctorOptions& options) {
   const lab::Recorded recorded = record(options, recording_options(settings, choice.used));
   lab::Examination examination(recorded, settings.robot);
   lab::Diagnosis diagnosis = examination.run();
-  return {config, settings, std::move(diagnosis), examination.refinements()};
+  return {config, settings, std::move(diagnosis), examination.refinements(), recorded.reading.without_deskew};
 }
 
 int doctor(const DoctorOptions& options) {
@@ -113,9 +114,10 @@ int doctor(const DoctorOptions& options) {
 
 /// By the estimator, which knows the LiDAR's way better than the judgement of the description does.
 void refine_by_estimator(Judged& judged, const SO3& described, const DoctorOptions& options) {
-  if (!judged.diagnosis.good()) return;
   lab::RecordingOptions wanted = recording_options(judged.settings, {Sensor::imu, Sensor::lidar});
+  if (!judged.diagnosis.good() || !can_refine_lidar_position(judged.refinements, judged.without_deskew || wanted.no_deskew)) return;
   wanted.start = options.start;
+  wanted.duration = options.duration;
   fmt::print(stderr, "kilvo: measuring the position of the LiDAR on the IMU by a run on these two\n");
   lab::RecordingSource source(options.input, wanted);
   refine_lidar_position(judged.refinements, described, judged.settings, source, options.duration);

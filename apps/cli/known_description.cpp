@@ -83,10 +83,12 @@ KnownDescription refined(const lab::Settings& settings, const RunOptions& option
     const lab::Settings described = mended(known, options, config);
     Measured now = measured(std::nullopt, refined_by, options, described, used, true);
     if (now.diagnosis.good()) {
-      const lab::RecordingOptions wanted = recording_options(options, described, {Sensor::imu, Sensor::lidar});
-      lab::RecordingSource source({options.inputs.begin(), options.inputs.end()}, wanted);
-      lab::FailingSource failing(source, options.failures, source.begin(), [&source] { return source.recorded(); });
-      refine_lidar_position(now.refinements, settings.robot.lidar.T_imu_lidar.R, described, failing, refined_by);
+      if (const auto wanted = recording_options(options, described, {Sensor::imu, Sensor::lidar});
+          can_refine_lidar_position(now.refinements, wanted.no_deskew)) {
+        lab::RecordingSource source({options.inputs.begin(), options.inputs.end()}, wanted);
+        lab::FailingSource failing(source, options.failures, source.begin(), [&source] { return source.recorded(); });
+        refine_lidar_position(now.refinements, settings.robot.lidar.T_imu_lidar.R, described, failing, refined_by);
+      }
       put_taken(known.refined, now.refinements);
       return known;
     }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -55,7 +56,7 @@ struct Output {
   // Only of sweeps:
   std::vector<PointXYZI> points_W;  // undistorted, in the world; empty unless EstimatorConfig::sweep_points or a camera wants them
   RegistrationReport registration;
-  std::optional<SweepUpdate> update;  // where EstimatorConfig::sweep_updates wants it, and the nearest planes were taken
+  std::shared_ptr<const SweepUpdate> update;  // where EstimatorConfig::sweep_updates wants it; none of sweeps that were searched for
   // Only of images:
   std::vector<ColouredPoint> coloured;  // points of the map that it sees, exposure-corrected
 };

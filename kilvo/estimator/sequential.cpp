@@ -84,8 +84,8 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   history_.resume(sweep.posterior);
   const bool good = keep_plausible(true);
   Output result;
-  if (config_.sweep_updates && good && sweep.carries && !first && !sweep.searched && !sweep.unpredicted)
-    result.update = {history_.base(), prior, sweep.posterior, history_.replay().samples()};
+  if (config_.sweep_updates && good && !first && sweep.is_plain())
+    result.update = std::make_shared<SweepUpdate>(history_.base(), prior, sweep.posterior, history_.replay().samples());
   result.stages.lidar_us = watch.lap_us();
 
   const SE3 T_WI = history_.now().x.pose();

@@ -37,6 +37,8 @@ struct Registration {
   PoseCovariance systematic = PoseCovariance::Zero();  // see LidarModel
   PoseCovariance considered = PoseCovariance::Zero();  // of the pose, beyond the prior's: of a description that is not exact
   PoseCovariance released = PoseCovariance::Zero();    // see LidarPipeline::release()
+  /// The posterior is the prior and this sweep, and nothing else.
+  bool is_plain() const { return carries && !searched && !unpredicted && released.isZero(0); }
 };
 
 class LidarPipeline {

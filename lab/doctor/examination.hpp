@@ -231,7 +231,7 @@ inline constexpr const char* lidar_position = "position of the LiDAR on the IMU"
 Refinement refined_lidar_position(const Eigen::Vector3d& described, const Eigen::Vector3d& error, const Eigen::Vector3d& sigma,
                                   double method);
 /// `turned`: see expected_shift.
-Refinement refined_lidar_position(const Eigen::Vector3d& described, const MountMeasurement& measured, const Eigen::Vector3d& turned);
+Refinement refined_lidar_position(const Eigen::Vector3d& described, MountMeasurement measured, const Eigen::Vector3d& turned);
 
 /// From each sweep to the next, where both are registered.
 std::vector<Turn> turns_of(const std::vector<SweepPose>& way);

@@ -12,6 +12,7 @@ namespace kilvo::lab {
 namespace {
 
 constexpr double position_tolerance = 0.02, worth_waiting = 0.05;  // m
+constexpr double largest_position_sigma = 0.01;                    // m
 // Standard deviations: that are of the scatter alone, and a right place was 4 of them off on 14 s of soft ground, 6 on a walk to and fro
 // with a rough IMU.
 constexpr double sure_of_position = 8;
@@ -20,19 +21,23 @@ constexpr double sure_of_position = 8;
 
 Refinement refined_lidar_position(const Eigen::Vector3d& described, const Eigen::Vector3d& error, const Eigen::Vector3d& sigma,
                                   double method) {
-  constexpr double largest = 0.01;  // m
   Refinement r = refinement(Sensor::lidar, lidar_position, {error.x(), error.y(), error.z()}, {sigma.x(), sigma.y(), sigma.z()}, method,
-                            largest, fmt::format("m"));
+                            largest_position_sigma, fmt::format("m"));
   r.changes = {{"lidar.T_imu_lidar.p", vector_text(described + r.taken_vector())}};
   return r;
 }
 
-Refinement refined_lidar_position(const Eigen::Vector3d& described, const MountMeasurement& measured, const Eigen::Vector3d& turned) {
+Refinement refined_lidar_position(const Eigen::Vector3d& described, MountMeasurement measured, const Eigen::Vector3d& turned) {
   constexpr double method = 0.001;  // m
-  Refinement r = refined_lidar_position(described, measured.error.tail<3>(), measured.covariance.diagonal().tail<3>().cwiseSqrt(), method);
-  const Eigen::Vector3d taken = r.observable ? expected_shift(measured, turned).value_or(Eigen::Vector3d::Zero()) : Eigen::Vector3d::Zero();
-  r.taken = {taken.x(), taken.y(), taken.z()};
-  r.changes = {{"lidar.T_imu_lidar.p", vector_text(described + taken)}};
+  const Eigen::Vector3d error = measured.error.tail<3>(), sigma = measured.covariance.diagonal().tail<3>().cwiseSqrt();
+  Refinement r = refined_lidar_position(described, error, sigma, method);
+  measured.covariance.diagonal().tail<3>().array() += method * method;
+  const auto shift = expected_shift(measured, turned);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const bool is_taken = shift && r.sigma[i] <= largest_position_sigma;
+    r.taken[i] = is_taken ? (*shift)[static_cast<Eigen::Index>(i)] : 0;
+  }
+  r.changes = {{"lidar.T_imu_lidar.p", vector_text(described + r.taken_vector())}};
   return r;
 }
 

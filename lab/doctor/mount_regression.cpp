@@ -14,8 +14,9 @@ namespace {
 
 constexpr Duration score_length = std::chrono::seconds(2);  // longer than what a model gets wrong lasts
 constexpr int fewest_scores = 5;
-constexpr double score_freedom = 6;  // degrees, of the innovations' distribution (Student)
-constexpr double unknown = 0.1;      // rad and m: standard deviation of what nothing is known of
+constexpr Duration settling = std::chrono::seconds(3);  // after which the biases follow from innovations
+constexpr double score_freedom = 6;                     // degrees, of the innovations' distribution (Student)
+constexpr double unknown = 0.1;                         // rad and m: standard deviation of what nothing is known of
 
 // Standard deviations of the place, m, of mounts that were calibrated, designed, and measured by hand. What tilts a bracket by an angle
 // moves its end by the angle times a length of a metre.
@@ -25,19 +26,20 @@ constexpr double bracket = 1;  // m
 }  // namespace
 
 std::optional<Eigen::Vector3d> expected_shift(const MountMeasurement& measured, const Eigen::Vector3d& turned) {
+  constexpr double of_a_bracket = 0.05;  // rad: a larger turn is that of another convention, and says nothing of how exact it is
   Eigen::Matrix<double, 6, 1> error = measured.error;
-  error.head<3>() += turned;
+  if (turned.norm() < of_a_bracket) error.head<3>() += turned;
   std::array<double, exactness.size()> logarithm;
   std::array<Eigen::Vector3d, exactness.size()> shift;
   for (std::size_t i = 0; i < exactness.size(); ++i) {
-    const double shift_sigma = exactness[i], turn_sigma = shift_sigma / bracket;
+    const double variance = exactness[i] * exactness[i];
     PoseCovariance S = measured.covariance;
-    S.diagonal().head<3>().array() += turn_sigma * turn_sigma;
-    S.diagonal().tail<3>().array() += shift_sigma * shift_sigma;
+    S.diagonal().head<3>().array() += variance / (bracket * bracket);
+    S.diagonal().tail<3>().array() += variance;
     const Eigen::LDLT<PoseCovariance> factored(S);
-    const Eigen::Matrix<double, 6, 1> weighed = factored.solve(error);
-    logarithm[i] = -0.5 * (factored.vectorD().array().log().sum() + error.dot(weighed));
-    shift[i] = shift_sigma * shift_sigma * weighed.tail<3>();
+    logarithm[i] = -0.5 * (factored.vectorD().array().log().sum() + error.dot(factored.solve(error)));
+    // What it was turned by says how exact the description is, and no more: that has been corrected.
+    shift[i] = variance * S.bottomRightCorner<3, 3>().ldlt().solve(measured.error.tail<3>());
   }
   const double largest = std::ranges::max(logarithm);
   double weights = 0;
@@ -64,6 +66,7 @@ MountRegression::PoseJacobian MountRegression::of_pose(const State& x, const Eig
 
 void MountRegression::begin(const Estimate& e, const Eigen::Vector3d& rate) {
   D_.setZero();
+  begun_ = e.t;
   resting_force_ = -(e.x.R.inverse() * e.x.g);
   of_map_ = to_origin(e.x.pose()) * of_pose(e.x, rate);
   block_.setZero();
@@ -90,7 +93,9 @@ void MountRegression::propagate(const Estimate& from, Time until, std::span<cons
 }
 
 void MountRegression::add(const Estimate& from, const Estimate& prior, const Estimate& posterior, std::span<const ImuSample> imu) {
-  if (imu.empty() || imu.front().t > from.t || imu.back().t < prior.t) return last_.reset();
+  const auto is_gap = [](const ImuSample& a, const ImuSample& b) { return to_seconds(b.t - a.t) > blind_gap; };
+  if (imu.empty() || imu.front().t > from.t || imu.back().t < prior.t || std::ranges::adjacent_find(imu, is_gap) != imu.end())
+    return last_.reset();
   const auto after = std::ranges::lower_bound(imu, prior.t, {}, &ImuSample::t);
   const ImuSample& before = after == imu.begin() ? *after : *std::prev(after);
   const Eigen::Vector3d rate = ImuInterval::between(before, *after, prior.t, prior.t).gyro_begin - prior.x.bg;
@@ -106,13 +111,15 @@ void MountRegression::add(const Estimate& from, const Estimate& prior, const Est
   const Eigen::Matrix<double, 6, 1> step = boxminus(posterior.x, prior.x).head<6>();
   const Eigen::Matrix<double, 6, 1> pull = P_inverse * step;
   const double squared = pull.dot(known.completeOrthogonalDecomposition().solve(pull));
-  if (!std::isfinite(squared) || !known.allFinite()) return last_.reset();
+  if (!std::isfinite(squared) || !known.allFinite() || !G.allFinite()) return last_.reset();
+  D_ -= taken.topRows<states>() * G;
+  // What the biases were when it began depends on the parameters in a way that is not known.
+  if (posterior.t - begun_ < settling) return;
   const double weight = (score_freedom + 6) / (score_freedom + std::max(0.0, squared));
   const Eigen::Matrix<double, of::size, 6> weighed = weight * G.transpose();
   N_ += weighed * known * G;
   n_ += weighed * pull;
   block_ += weighed * (pull - known * (G * expected_));
-  D_ -= taken.topRows<states>() * G;
 
   if (posterior.t - block_begin_ < score_length) return;
   scatter_ += block_ * block_.transpose();
@@ -141,7 +148,9 @@ std::optional<MountMeasurement> MountRegression::measured() const {
   const Solution usual = solved(exactness.back());
   const Eigen::Vector3d shown = (usual.covariance * scatter_ * usual.covariance).diagonal().segment<3>(of::shift);
   const double excess = std::max(1.0, shown.cwiseQuotient(usual.covariance.diagonal().segment<3>(of::shift)).mean());
-  return MountMeasurement{s.x.head<6>(), excess * s.covariance.topLeftCorner<6, 6>()};
+  const MountMeasurement out{s.x.head<6>(), excess * s.covariance.topLeftCorner<6, 6>()};
+  if (!out.error.allFinite() || !out.covariance.allFinite() || !(out.covariance.diagonal().minCoeff() > 0)) return std::nullopt;
+  return out;
 }
 
 }  // namespace kilvo::lab

@@ -1,4 +1,4 @@
-// Where the LiDAR sits on the IMU, from the innovations of a filter of both. The filter goes along with the described mount. How the error
+// Where the LiDAR sits on the IMU, from the innovations of a filter of both. The filter believes the described mount. How the error
 // of its state depends on the mount, on the LiDAR's clock and on the axes of the IMU is propagated with it; its innovations are then a
 // linear regression on these, as exact as with all of them in the state (B. Friedland, "Treatment of bias in recursive filtering", 1969).
 #pragma once
@@ -18,7 +18,8 @@ struct MountMeasurement {
 };
 
 /// Of that, what a description is expected to be off by: it was calibrated, designed, or measured by hand, each as likely beforehand, and
-/// its turn is as exact as its shift. `turned`: what its turn (rad) was off by and is no more. None when it was probably
+/// its turn is as exact as its shift. `turned`: by how much the described rotation was wrong
+/// (rad) before it was corrected. None when it was probably
 /// calibrated.
 std::optional<Eigen::Vector3d> expected_shift(const MountMeasurement& measured, const Eigen::Vector3d& turned);
 
@@ -30,7 +31,7 @@ class MountRegression {
   /// after `from`, the last not before `prior`, and with nothing else.
   void add(const Estimate& from, const Estimate& prior, const Estimate& posterior, std::span<const ImuSample> imu);
 
-  /// None before ten seconds of sweeps.
+  /// None before 13 seconds of sweeps.
   std::optional<MountMeasurement> measured() const;
 
  private:
@@ -61,7 +62,7 @@ class MountRegression {
   // The regression: normal equations, and the squares of their right side in blocks.
   ParameterMatrix N_ = ParameterMatrix::Zero(), scatter_ = ParameterMatrix::Zero();
   Parameters n_ = Parameters::Zero(), block_ = Parameters::Zero(), expected_ = Parameters::Zero();
-  Time block_begin_{};
+  Time begun_{}, block_begin_{};
   int blocks_ = 0;
 };
 

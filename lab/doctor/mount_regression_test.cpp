@@ -101,7 +101,7 @@ TEST(MountRegression, MeasuresTurnAndShift) {
     ASSERT_TRUE(m);
     const Vector6 sigma = m->covariance.diagonal().cwiseSqrt(), off = m->error - wrong;
     EXPECT_LT(off.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 3) << seed;
-    EXPECT_LT(off.tail<3>().norm(), 0.003) << seed;
+    EXPECT_LT(off.tail<3>().norm(), 0.005) << seed;
     const auto shift = expected_shift(*m, Eigen::Vector3d::Zero());
     ASSERT_TRUE(shift) << seed;
     EXPECT_LT((*shift - wrong.tail<3>()).norm(), 0.5 * wrong.tail<3>().norm()) << seed;
@@ -136,6 +136,15 @@ TEST(MountRegression, ATurnThatWasFoundBeforeSaysHowTheMountWasDescribed) {
   ASSERT_TRUE(turned);
   EXPECT_GT(turned->norm(), 0.7 * m.error.tail<3>().norm());
   EXPECT_LT(alone.value_or(Eigen::Vector3d::Zero()).norm(), turned->norm());
+  // It has been corrected: what it has in common with the shift is none of what the shift is.
+  m.covariance.block<3, 3>(0, 3).diagonal().setConstant(2e-6);
+  m.covariance.block<3, 3>(3, 0).diagonal().setConstant(2e-6);
+  const auto in_common = expected_shift(m, {0.02, -0.02, 0.03});
+  ASSERT_TRUE(in_common);
+  EXPECT_LT((*in_common - m.error.tail<3>()).norm(), 0.3 * m.error.tail<3>().norm());
+  // Another convention says nothing.
+  EXPECT_EQ(expected_shift(m, {M_PI, 0, 0}).value_or(Eigen::Vector3d::Zero()),
+            expected_shift(m, Eigen::Vector3d::Zero()).value_or(Eigen::Vector3d::Zero()));
 }
 
 TEST(MountRegression, SaysNothingOfAFewSecondsOrOfSweepsThatDoNotFollowEachOther) {

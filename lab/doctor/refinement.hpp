@@ -16,7 +16,7 @@ struct Refinement {
   std::string unit;            // deg, m, s, or - for a factor
   /// The part of `change` that is to be made: the posterior mean, component by component, when what descriptions of this kind are off by
   /// has the variance that `change` itself shows beyond `sigma` (empirical Bayes), and no more than that component shows by itself. Nothing
-  /// when `change` is no larger than chance makes it.
+  /// when `change` is no larger than chance makes it. Of the LiDAR's position: see expected_shift.
   std::vector<double> taken;
   bool observable = true;       // false: the motion showed nothing of it
   bool significant = false;     // some component is more than 3 standard deviations off
