@@ -70,7 +70,7 @@ void MountRegression::begin(const Estimate& e, const Eigen::Vector3d& rate) {
   resting_force_ = -(e.x.R.inverse() * e.x.g);
   of_map_ = to_origin(e.x.pose()) * of_pose(e.x, rate);
   block_.setZero();
-  block_begin_ = e.t;
+  block_begin_ = e.t + settling;
 }
 
 void MountRegression::propagate(const Estimate& from, Time until, std::span<const ImuSample> imu) {
