@@ -23,6 +23,10 @@ constexpr double unknown = 0.1;                         // rad and m: standard d
 constexpr std::array<double, 3> exactness = {3e-4, 2e-3, 5e-3};
 constexpr double bracket = 1;  // m
 
+// Squared, per covariance, of three axes (99.9 % of chi-square): a shift that is less likely than this, were it described as badly as any
+// mount is, shows an error of the measurement.
+constexpr double unlikely = 16.27;
+
 }  // namespace
 
 std::optional<Eigen::Vector3d> expected_shift(const MountMeasurement& measured, const Eigen::Vector3d& turned) {
@@ -41,6 +45,9 @@ std::optional<Eigen::Vector3d> expected_shift(const MountMeasurement& measured, 
     // What it was turned by says how exact the description is, and no more: that has been corrected.
     shift[i] = variance * S.bottomRightCorner<3, 3>().ldlt().solve(measured.error.tail<3>());
   }
+  Eigen::Matrix3d widest = measured.covariance.bottomRightCorner<3, 3>();
+  widest.diagonal().array() += exactness.back() * exactness.back();
+  if (measured.error.tail<3>().dot(widest.ldlt().solve(measured.error.tail<3>())) > unlikely) return std::nullopt;
   const double largest = std::ranges::max(logarithm);
   double weights = 0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();

@@ -1,5 +1,6 @@
 #include "lab/doctor/mount_regression.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <random>
@@ -56,6 +57,7 @@ std::optional<MountMeasurement> measured(const Vector6& error, const Eigen::Matr
   e.x.p = place(0);
   e.x.v = (place(1e-4) - place(-1e-4)) / 2e-4;
   for (int k = 0; k < at::pcl; ++k) e.P(k, k) = k < at::p ? 1e-6 : k < at::v ? 1e-8 : k < at::bg ? 1e-4 : k < at::ba ? 1e-8 : 1e-3;
+  e.P(at::g + 2, at::g + 2) = 0;  // gravity's length is known
   MountRegression regression(described);
   std::vector<ImuSample> samples{imu_at(0, accel_axes)};
   for (double t = sweep_period; t < seconds; t += sweep_period) {
@@ -108,6 +110,20 @@ TEST(MountRegression, MeasuresTurnAndShift) {
   }
 }
 
+TEST(MountRegression, IsRightOnAverage) {
+  const Vector6 wrong = off_by({0.4, -0.3, 0.2}, {5, -4, 6});
+  constexpr int walks = 8;
+  Vector6 off = Vector6::Zero(), variance = Vector6::Zero();
+  for (std::uint32_t seed = 1; seed <= walks; ++seed) {
+    const auto m = measured(wrong, Eigen::Matrix3d::Identity(), seed);
+    ASSERT_TRUE(m);
+    off += (m->error - wrong) / walks;
+    variance += m->covariance.diagonal() / (walks * walks);
+  }
+  EXPECT_LT(off.cwiseQuotient(variance.cwiseSqrt()).cwiseAbs().maxCoeff(), 3);
+  EXPECT_LT(off.tail<3>().norm(), 0.001);
+}
+
 TEST(MountRegression, IsNotMisledByTheAxesOfTheAccelerometer) {
   Eigen::Matrix3d axes;
   axes << 1.005, 0.004, -0.003, 0.002, 0.995, 0.005, -0.004, 0.003, 1.004;
@@ -145,6 +161,24 @@ TEST(MountRegression, ATurnThatWasFoundBeforeSaysHowTheMountWasDescribed) {
   // Another convention says nothing.
   EXPECT_EQ(expected_shift(m, {M_PI, 0, 0}).value_or(Eigen::Vector3d::Zero()),
             expected_shift(m, Eigen::Vector3d::Zero()).value_or(Eigen::Vector3d::Zero()));
+}
+
+TEST(MountRegression, TakesTheMoreTheLargerItIsUntilNoDescriptionIsThatWrong) {
+  MountMeasurement m;
+  m.error.setZero();
+  m.covariance = PoseCovariance::Zero();
+  m.covariance.diagonal().setConstant(2e-6);
+  double taken = 0;
+  for (const double shift : {0.007, 0.01, 0.015, 0.019}) {
+    m.error[3] = shift;
+    const auto expected = expected_shift(m, Eigen::Vector3d::Zero());
+    ASSERT_TRUE(expected) << shift;
+    EXPECT_GT(expected->x(), std::max(taken, 0.5 * shift)) << shift;
+    taken = expected->x();
+  }
+  m.error.tail<3>() << -0.033, 0.008, 0.002;
+  m.covariance.diagonal().setConstant(2.5e-5);
+  EXPECT_FALSE(expected_shift(m, Eigen::Vector3d::Zero()));
 }
 
 TEST(MountRegression, SaysNothingOfAFewSecondsOrOfSweepsThatDoNotFollowEachOther) {
