@@ -30,6 +30,10 @@ constexpr double unlikely = 16.27;
 }  // namespace
 
 std::optional<Eigen::Vector3d> expected_shift(const MountMeasurement& measured, const Eigen::Vector3d& turned) {
+  const Eigen::Vector3d measured_shift = measured.error.tail<3>();
+  Eigen::Matrix3d widest = measured.covariance.bottomRightCorner<3, 3>();
+  widest.diagonal().array() += exactness.back() * exactness.back();
+  if (measured_shift.dot(widest.ldlt().solve(measured_shift)) > unlikely) return std::nullopt;
   constexpr double of_a_bracket = 0.05;  // rad: a larger turn is that of another convention, and says nothing of how exact it is
   Eigen::Matrix<double, 6, 1> error = measured.error;
   if (turned.norm() < of_a_bracket) error.head<3>() += turned;
@@ -43,11 +47,8 @@ std::optional<Eigen::Vector3d> expected_shift(const MountMeasurement& measured, 
     const Eigen::LDLT<PoseCovariance> factored(S);
     logarithm[i] = -0.5 * (factored.vectorD().array().log().sum() + error.dot(factored.solve(error)));
     // What it was turned by says how exact the description is, and no more: that has been corrected.
-    shift[i] = variance * S.bottomRightCorner<3, 3>().ldlt().solve(measured.error.tail<3>());
+    shift[i] = variance * S.bottomRightCorner<3, 3>().ldlt().solve(measured_shift);
   }
-  Eigen::Matrix3d widest = measured.covariance.bottomRightCorner<3, 3>();
-  widest.diagonal().array() += exactness.back() * exactness.back();
-  if (measured.error.tail<3>().dot(widest.ldlt().solve(measured.error.tail<3>())) > unlikely) return std::nullopt;
   const double largest = std::ranges::max(logarithm);
   double weights = 0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();

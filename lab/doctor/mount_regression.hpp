@@ -18,8 +18,8 @@ struct MountMeasurement {
 };
 
 /// Of that, what a description is expected to be off by: it was calibrated, designed, or measured by hand, each as likely beforehand, and
-/// its turn is as exact as its shift. `turned`: by how much the described rotation was wrong
-/// (rad) before it was corrected. None when it was probably calibrated, and of a shift that no description is off by.
+/// its turn is as exact as its shift. `turned`: by how much the described rotation was wrong (rad) before it was corrected. None when it
+/// was probably calibrated, and of a shift that no description is off by.
 std::optional<Eigen::Vector3d> expected_shift(const MountMeasurement& measured, const Eigen::Vector3d& turned);
 
 class MountRegression {
