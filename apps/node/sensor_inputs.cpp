@@ -73,6 +73,10 @@ void SensorInputs::take(Sensor sensor, const Arrived& arrived) {
     if (input.intake.newest_fault().empty()) input.fault.clear();
     if (measurement && is_quick(sensor) && !give_time(input, *measurement, arrived.at)) return;
   }
+  if (const int found = input.intake.finding_count(); found > input.findings) {
+    input.findings = found;
+    for (const std::string& text : input.intake.findings()) tell_once(input, text);
+  }
   if (measurement && !bring_onto_imu_clock(input, *measurement, arrived.at)) return;
   if (measurement) {
     sink_(*std::move(measurement), arrived.at);
@@ -139,16 +143,23 @@ void SensorInputs::search_point_time(const Arrived& arrived) {
   for (const Held& cloud : clouds) take(Sensor::lidar, {cloud.type, {cloud.bytes, cloud.encoding}, cloud.at});
 }
 
-// Each kind is reported once: garbage has another fault in every message, and so many numbers in them.
 void SensorInputs::complain(Input& input, const std::string& fault) {
-  std::string kind = fault;
-  std::erase_if(kind, [](char c) { return c >= '0' && c <= '9'; });
   {
     const std::lock_guard lock(input.mutex);
     input.fault = fault;
+  }
+  tell_once(input, fault);
+}
+
+// Each kind is reported once: garbage has another fault in every message, and so many numbers in them.
+void SensorInputs::tell_once(Input& input, const std::string& text) {
+  std::string kind = text;
+  std::erase_if(kind, [](char c) { return c >= '0' && c <= '9'; });
+  {
+    const std::lock_guard lock(input.mutex);
     if (input.said.size() >= most_kinds || !input.said.insert(kind).second) return;
   }
-  say_(input.topic + ": " + fault);
+  say_(input.topic + ": " + text);
 }
 
 void SensorInputs::note_connection(Sensor sensor, const std::string& fault) {

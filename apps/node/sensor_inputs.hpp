@@ -79,6 +79,7 @@ class SensorInputs {
     std::optional<SteadyClock::time_point> last;
     std::optional<SteadyClock::time_point> raw_last;  // of the camera: uncompressed
     lab::SensorIntake intake;
+    int findings = 0;            // of the intake, that the user was told
     std::string fault;           // of the newest message
     std::set<std::string> said;  // kinds of faults that the user was told, without their numbers
     std::string connection;
@@ -91,6 +92,7 @@ class SensorInputs {
   bool bring_onto_imu_clock(Input& input, Measurement& measurement, Time arrived);
   void search_point_time(const Arrived& arrived);
   void complain(Input& input, const std::string& fault);
+  void tell_once(Input& input, const std::string& text);
   Input& input_of(Sensor sensor) { return inputs_[static_cast<std::size_t>(sensor)]; }
 
   Sink sink_;

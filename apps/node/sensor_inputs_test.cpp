@@ -74,6 +74,32 @@ TEST(SensorInputs, BringStampsOfAnotherEpochOntoTheImusAndSayItOnce) {
   EXPECT_NEAR(static_cast<double>(legs.counts.dropped.at("clock not known yet")), 500, 10);
 }
 
+TEST(SensorInputs, StampsOfAnImuThatComesInBurstsAreEvenAndThatIsReportedOnce) {
+  Live live;
+  constexpr Duration period = std::chrono::milliseconds(5);
+  for (int k = 0; k < 2000; ++k) {
+    const Time last = day + (k / 5 * 5 + 4) * period;
+    live.receive(ImuSample{last, {0, 0, 1e-3 * (k % 7)}, {0, 0, 9.81}}, last + std::chrono::milliseconds(1));
+  }
+  EXPECT_THAT(live.said, ElementsAre(HasSubstr("stamps scatter by")));
+  ASSERT_EQ(live.count(Sensor::imu), 2000);
+  for (std::size_t k = 1000; k < live.out.size(); ++k) {
+    EXPECT_NEAR(to_seconds(stamp_of(live.out[k]) - stamp_of(live.out[k - 1])), to_seconds(period), 2e-4);
+    EXPECT_NEAR(to_seconds(stamp_of(live.out[k]) - day), 0.005 * static_cast<double>(k), 4e-3);
+  }
+}
+
+TEST(SensorInputs, MessagesOfAnImuThatComeTwiceAreNoSamplesMore) {
+  Live live;
+  for (int k = 0; k < 400; ++k) {
+    const Time t = day + k * std::chrono::milliseconds(5);
+    for (int i = 0; i < 2; ++i) live.receive(ImuSample{t, {0, 0, 1e-3 * (k % 7)}, {0, 0, 9.81}}, t);
+  }
+  EXPECT_THAT(live.said, IsEmpty());
+  for (std::size_t i = 0; i < live.out.size(); ++i)
+    EXPECT_EQ(stamp_of(live.out[i]), day + static_cast<int>(i / 2) * std::chrono::milliseconds(5));
+}
+
 // As kilvo run does, by the configuration or by the option.
 TEST(SensorInputs, TakeCloudsAtTheirStampWhereTheyAreNotToBeDeskewed) {
   for (const auto& [deskew, no_deskew, last] : {std::tuple{true, false, 90'000'000}, {false, false, 0}, {true, true, 0}}) {

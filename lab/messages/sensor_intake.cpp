@@ -5,6 +5,11 @@
 namespace kilvo::lab {
 namespace {
 
+// Stamps that scatter by less are everyday, s.
+constexpr double remarkable_scatter = 1e-3;
+
+std::string plural(std::uint64_t count, const char* what) { return std::to_string(count) + " " + what + (count == 1 ? "" : "s"); }
+
 Time& stamp_in(Measurement& measurement) {
   return std::visit([](auto& m) -> Time& { return m.t; }, measurement);
 }
@@ -34,6 +39,15 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
     ++counts_.unstamped;
   }
   stamp += from_seconds(time_offset_);
+  if (const auto* imu = std::get_if<ImuSample>(&decoded->measurement)) {
+    // A message that comes twice is none that was measured later.
+    const bool is_repeated = newest_imu_ && newest_imu_->t == imu->t && newest_imu_->gyro == imu->gyro && newest_imu_->accel == imu->accel;
+    newest_imu_ = *imu;
+    if (!is_repeated) imu_stamp_ = even_stamps_.follow_sample(stamp);
+    stamp = imu_stamp_;
+  }
+  // What a message says beside its IMU was measured with it.
+  if (gyro_ && std::holds_alternative<JointSample>(decoded->measurement)) stamp = even_stamps_.follow_sample(stamp);
   if (auto* scan = std::get_if<LidarScan>(&decoded->measurement)) {
     const std::size_t repeated = repeated_.take_out(*scan);
     counts_.repeated_points += repeated;
@@ -41,7 +55,9 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
       take_back("repeated");
       return std::nullopt;
     }
+    stamp = even_stamps_.follow_sweep(stamp, begin_of(*scan), end_of(*scan));
   }
+  if (const double scatter = even_stamps_.scatter().value_or(0); scatter > remarkable_scatter) scatter_ = scatter;
   auto* joints = std::get_if<JointSample>(&decoded->measurement);
   if (joints == nullptr) return std::move(decoded->measurement);
   auto whole = assembly_.join(std::move(*joints), arrived);
@@ -49,6 +65,24 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
   if (!whole && !assembly_.is_of_legs()) take_back("no joint of the legs");
   if (!whole) return std::nullopt;
   return *std::move(whole);
+}
+
+std::vector<std::string> SensorIntake::findings() const {
+  std::vector<std::string> texts;
+  if (counts_.absurd_point_times > 0) {
+    texts.push_back(plural(counts_.absurd_point_times, "point") + " dropped, whose time is not within 2 s of the stamp");
+  }
+  if (counts_.repeated_points > 0) {
+    texts.push_back("clouds repeat points of the one before: " + plural(counts_.repeated_points, "point") +
+                    " used once; the driver should publish one scan in each message");
+  }
+  if (scatter_ > 0) {
+    texts.push_back(
+        "stamps scatter by " + std::to_string(1e3 * scatter_) +
+        " ms and contradict each other, though the sensor measures evenly: the times of a line through them are used; the driver "
+        "should stamp by the sensor's clock");
+  }
+  return texts;
 }
 
 }  // namespace kilvo::lab

@@ -6,9 +6,11 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "kilvo/sensors/measurement.hpp"
 #include "lab/messages/encoding.hpp"
+#include "lab/messages/even_stamps.hpp"
 #include "lab/messages/joint_assembly.hpp"
 #include "lab/messages/point_time.hpp"
 #include "lab/messages/repeated_points.hpp"
@@ -53,6 +55,13 @@ class SensorIntake {
   /// The rate of the gyroscope that the last message held beside its joints, rad/s; nothing when it held none.
   const std::optional<Eigen::Vector3d>& gyro() const { return gyro_; }
 
+  /// What the user should know of how the driver writes points and stamps, one sentence each: only more in the course of time.
+  std::vector<std::string> findings() const;
+  /// How many they are.
+  int finding_count() const {
+    return (scatter_ > 0 ? 1 : 0) + (counts_.repeated_points > 0 ? 1 : 0) + (counts_.absurd_point_times > 0 ? 1 : 0);
+  }
+
   const SensorCounts& counts() const { return counts_; }
   /// Why the first undecodable message was; empty without one.
   const std::string& first_fault() const { return first_fault_; }
@@ -66,6 +75,10 @@ class SensorIntake {
   JointNames joint_names_;  // of the message that was taken last
   JointAssembly assembly_;
   RepeatedPoints repeated_;
+  EvenStamps even_stamps_;
+  std::optional<ImuSample> newest_imu_;  // with the stamp that it came with
+  Time imu_stamp_{};                     // that it was given
+  double scatter_ = 0;                   // s, of stamps for which even ones were used; 0: of none, or not worth a word
   SensorCounts counts_;
   std::string first_fault_, newest_fault_;
   std::optional<std::uint32_t> tick_;

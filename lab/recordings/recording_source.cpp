@@ -149,13 +149,7 @@ std::vector<std::string> RecordingSource::warnings() const {
       texts.push_back(topic + ": " + plural(counts.unused_parts, "message") +
                       " with a part of the joints not used: the others did not come in time");
     }
-    if (counts.absurd_point_times > 0) {
-      texts.push_back(topic + ": " + plural(counts.absurd_point_times, "point") + " dropped, whose time is not within 2 s of the stamp");
-    }
-    if (counts.repeated_points > 0) {
-      texts.push_back(topic + ": clouds repeat points of the one before: " + plural(counts.repeated_points, "point") +
-                      " used once; the driver should publish one scan in each message");
-    }
+    for (const std::string& text : intakes_[i].findings()) texts.push_back(topic + ": " + text);
   }
   for (const Sensor sensor : all_sensors) {
     if (std::string text = clocks_.finding(sensor); !text.empty()) texts.push_back(std::move(text));
