@@ -98,7 +98,7 @@ bool SensorInputs::give_time(Input& input, Measurement& measurement, Time arrive
 bool SensorInputs::bring_onto_imu_clock(Input& input, Measurement& measurement, Time arrived) {
   const Sensor sensor = sensor_of(measurement);
   std::optional<Duration> by;
-  std::string finding;
+  std::string finding, drift;
   bool known = false;
   {
     const std::lock_guard lock(clocks_mutex_);
@@ -107,6 +107,7 @@ bool SensorInputs::bring_onto_imu_clock(Input& input, Measurement& measurement, 
     if (known) clocks_.correct(measurement);
     by = clocks_.offset(sensor);
     if (by && !input.moved) finding = clocks_.finding(sensor);
+    if (!input.drifts) drift = clocks_.drift_finding(sensor);
   }
   {
     const std::lock_guard lock(input.mutex);
@@ -114,6 +115,10 @@ bool SensorInputs::bring_onto_imu_clock(Input& input, Measurement& measurement, 
     if (by) input.moved = to_seconds(*by);
   }
   if (!finding.empty()) say_(finding);
+  if (!drift.empty()) {
+    input.drifts = true;
+    say_(drift);
+  }
   return known;
 }
 

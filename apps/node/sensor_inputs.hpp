@@ -80,6 +80,7 @@ class SensorInputs {
     std::optional<SteadyClock::time_point> raw_last;  // of the camera: uncompressed
     lab::SensorIntake intake;
     int findings = 0;            // of the intake, that the user was told
+    bool drifts = false;         // so was that its clock does
     std::string fault;           // of the newest message
     std::set<std::string> said;  // kinds of faults that the user was told, without their numbers
     std::string connection;

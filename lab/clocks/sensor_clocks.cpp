@@ -14,6 +14,8 @@ constexpr Duration most_early = std::chrono::seconds(2), most_late = std::chrono
 // Another clock is believed after so long, and so many messages.
 constexpr Duration evidence = std::chrono::seconds(1);
 constexpr std::size_t fewest = 3;
+// Of which least delays are taken.
+constexpr Duration stretch = std::chrono::seconds(2);
 // Sensors whose clocks seem so near to each other have one and the same: what is between them are their delays. Devices that have
 // been switched on at different times differ by more.
 constexpr Duration one_clock = std::chrono::milliseconds(100);
@@ -59,11 +61,25 @@ void SensorClocks::Stream::add(Time arrived, Duration delay) {
 void SensorClocks::note(const Measurement& m, Time arrived) {
   const Sensor sensor = sensor_of(m);
   Stream& stream = streams_[index_of(sensor)];
-  if (is_given_up_ || stream.is_judged) return;
   if (std::abs(to_seconds(arrived.time_since_epoch()) - to_seconds(stamp_of(m).time_since_epoch())) > absurd) return;
+  follow_drift(stream, arrived, arrived - stamp_of(m));
+  if (is_given_up_ || stream.is_judged) return;
   stream.add(arrived, arrived - completion_of(m));
   for (const Sensor other : all_sensors) {
     if (!knows(other) && (other == sensor || sensor == Sensor::imu)) judge(other, arrived);
+  }
+}
+
+void SensorClocks::follow_drift(Stream& stream, Time arrived, Duration delay) {
+  if (!stretch_ || arrived < *stretch_) stretch_ = arrived;
+  stream.least = stream.least ? std::min(*stream.least, delay) : delay;
+  if (arrived - *stretch_ < stretch) return;
+  stretch_ = arrived;
+  const auto of_imu = streams_[index_of(Sensor::imu)].least;
+  for (Stream& s : streams_) {
+    if (s.least && of_imu) s.drift.add(arrived, to_seconds(*s.least - *of_imu));
+    if (s.drift.rate() != 0) s.known_drift = s.drift.rate();
+    s.least.reset();
   }
 }
 
@@ -91,7 +107,8 @@ void SensorClocks::judge(Sensor s, Time arrived) {
 }
 
 void SensorClocks::correct(Measurement& m) const {
-  if (const auto& by = offset(sensor_of(m))) std::visit([&by](auto& x) { x.t += *by; }, m);
+  const Stream& stream = streams_[index_of(sensor_of(m))];
+  std::visit([&stream](auto& x) { x.t += stream.offset.value_or(Duration(0)) + stream.drift.correction(); }, m);
 }
 
 std::string SensorClocks::finding(Sensor s) const {
@@ -101,6 +118,15 @@ std::string SensorClocks::finding(Sensor s) const {
   return name + ": its stamps are of another clock than the IMU's: by the times of arrival they lie " + std::to_string(std::abs(by)) +
          " s " + (by > 0 ? "before" : "after") + " the IMU's, and are moved by that. Synchronise the clocks; for these data " + name +
          ".time_offset: " + std::to_string(time_offsets_[index_of(s)] + by) + " does the same";
+}
+
+std::string SensorClocks::drift_finding(Sensor s) const {
+  const double drift = streams_[index_of(s)].known_drift;
+  if (drift == 0) return {};
+  const std::string name = name_of(s);
+  return name + ": its clock is " + std::to_string(static_cast<int>(std::round(1e6 * std::abs(drift)))) + " parts in a million " +
+         (drift > 0 ? "faster" : "slower") +
+         " than the IMU's, by the times of arrival; its stamps follow the IMU's from then on. Synchronise the clocks";
 }
 
 }  // namespace kilvo::lab

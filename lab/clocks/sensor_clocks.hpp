@@ -4,7 +4,8 @@
 // differ by anything (a recording that was played and recorded again); but they differ by the same for all sensors that share one clock,
 // but for what each needs on its way. Where a sensor differs from the IMU by more than any way can take, its clock is another one, and
 // its stamps are moved by one constant onto the IMU's: so that its least delay is the IMU's. What jitters in the arrival does not enter. Of
-// several sensors with one such clock the one with the shortest way tells for all.
+// several sensors with one such clock the one with the shortest way tells for all. Clocks that are not disciplined drift apart; that is
+// followed (ClockDrift).
 #pragma once
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include <string>
 
 #include "kilvo/sensors/measurement.hpp"
+#include "lab/clocks/clock_drift.hpp"
 
 namespace kilvo::lab {
 
@@ -42,6 +44,8 @@ class SensorClocks {
   const std::optional<Duration>& offset(Sensor s) const { return streams_[index_of(s)].offset; }
   /// For the user: how far the sensor's clock is from the IMU's, and the setting that does the same. Empty where it is the IMU's.
   std::string finding(Sensor s) const;
+  /// The same of a clock that drifts against the IMU's. Empty where none is known to.
+  std::string drift_finding(Sensor s) const;
 
  private:
   struct Delay {
@@ -55,12 +59,17 @@ class SensorClocks {
     std::optional<Duration> clock;   // from its own to the IMU's
     std::optional<Duration> offset;  // that is added: all but what has been set already
     void add(Time arrived, Duration delay);
+    std::optional<Duration> least;  // delay in this stretch
+    ClockDrift drift;
+    double known_drift = 0;  // the newest that was not 0
   };
   void judge(Sensor s, Time arrived);
+  void follow_drift(Stream& stream, Time arrived, Duration delay);
 
   std::array<double, sensor_count> time_offsets_;
   std::array<Stream, sensor_count> streams_;
   bool is_given_up_ = false;
+  std::optional<Time> stretch_;  // when it began
 };
 
 }  // namespace kilvo::lab

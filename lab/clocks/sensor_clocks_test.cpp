@@ -215,5 +215,61 @@ TEST(SensorClocks, ASmallSettingIsAddedAndALargeOneIsOfOtherClocks) {
   EXPECT_FALSE(mended.offset(Sensor::legs));
 }
 
+/// The robot's messages, with each sensor's clock fast by so many parts in a million.
+std::vector<Robot::Arrival> drifting(const Robot& robot, const std::array<double, sensor_count>& ppm) {
+  auto out = robot.arrivals();
+  for (auto& a : out) {
+    std::visit([&](auto& x) { x.t += from_seconds(1e-6 * ppm[a.m.index()] * to_seconds(a.measured - day)); }, a.m);
+  }
+  return out;
+}
+
+TEST(SensorClocks, ThatDriftAreFollowed) {
+  Robot robot;
+  robot.length = seconds(600);
+  for (const double imu : {0.0, 30.0}) {
+    SensorClocks clocks;
+    const std::array<double, sensor_count> ppm{imu, 50, imu, -20};
+    double worst = 0, worst_lidar = 0;
+    for (const auto& a : drifting(robot, ppm)) {
+      Measurement m = a.m;
+      clocks.note(m, a.at);
+      clocks.correct(m);
+      const double true_stamp = to_seconds(a.measured - day) * (1 + 1e-6 * imu);
+      const double error = std::abs(to_seconds(stamp_of(m) - day) - true_stamp);
+      if (m.index() == 1) worst = std::max(worst, error);
+      if (m.index() == 2) worst_lidar = std::max(worst_lidar, error);
+    }
+    EXPECT_LT(worst, 6e-3) << "30 ms (12 against the IMU that drifts) without";
+    EXPECT_LT(worst_lidar, 1e-6) << "one clock with the IMU's";
+    EXPECT_THAT(clocks.drift_finding(Sensor::legs),
+                testing::HasSubstr(imu > 0 ? "20 parts in a million faster" : "50 parts in a million faster"));
+    EXPECT_THAT(clocks.drift_finding(Sensor::camera), testing::HasSubstr("slower"));
+    EXPECT_EQ(clocks.drift_finding(Sensor::lidar), "");
+  }
+}
+
+TEST(SensorClocks, DelaysThatStepOrGrowIntoAQueueAreNoDrift) {
+  Robot robot;
+  robot.length = seconds(300);
+  for (const bool steps : {true, false}) {
+    SensorClocks clocks;
+    auto arrivals = robot.arrivals();
+    for (auto& a : arrivals) {
+      if (a.m.index() != 1) continue;
+      const double since = to_seconds(a.measured - day);
+      a.at += from_seconds(steps ? (since > 100 ? 0.008 : 0) : 1e-3 * since);
+    }
+    std::ranges::stable_sort(arrivals, {}, &Robot::Arrival::at);
+    for (const auto& a : arrivals) {
+      Measurement m = a.m;
+      clocks.note(m, a.at);
+      clocks.correct(m);
+      ASSERT_EQ(stamp_of(m), stamp_of(a.m));
+    }
+    EXPECT_EQ(clocks.drift_finding(Sensor::legs), "");
+  }
+}
+
 }  // namespace sensor_clocks_test
 }  // namespace kilvo::lab

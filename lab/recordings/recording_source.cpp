@@ -152,7 +152,9 @@ std::vector<std::string> RecordingSource::warnings() const {
     for (const std::string& text : intakes_[i].findings()) texts.push_back(topic + ": " + text);
   }
   for (const Sensor sensor : all_sensors) {
-    if (std::string text = clocks_.finding(sensor); !text.empty()) texts.push_back(std::move(text));
+    for (const std::string& text : {clocks_.finding(sensor), clocks_.drift_finding(sensor)}) {
+      if (!text.empty()) texts.push_back(text);
+    }
   }
   if (options_.leg_clock) {
     const auto& clock = *options_.leg_clock;
