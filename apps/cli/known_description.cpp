@@ -59,9 +59,16 @@ Measured measured(std::optional<Time> from, double seconds, const RunOptions& op
   return {std::move(diagnosis), examination.refinements()};
 }
 
-Measured measured_after(const WrongDescription& first, const RunOptions& options, const lab::Settings& settings, std::vector<Sensor> used) {
+Measured measured_after(const WrongDescription& first, const RunOptions& options, const lab::Settings& settings, std::vector<Sensor> used,
+                        bool exact = true) {
   std::erase(used, Sensor::camera);
-  return measured(first.t, measured_for, options, settings, used, false);
+  return measured(first.t, measured_for, options, settings, used, exact);
+}
+
+std::vector<WrongDescription> as_wrong(const lab::Diagnosis& diagnosis, const WrongDescription& first) {
+  std::vector<WrongDescription> out;
+  for (const lab::Finding& f : diagnosis.findings) out.push_back(lab::as_wrong(f, first.t, first.after));
+  return out;
 }
 
 void put_taken(std::vector<lab::Change>& changes, const std::vector<lab::Refinement>& refinements) {
@@ -107,13 +114,17 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
   if (known.round == 1) {
     const WrongDescription first = wrong.front();
     // The same on more data, which measure what is wrong more precisely; and what is still off once that is mended.
-    const lab::Diagnosis longer = measured_after(first, options, mended(known, options, config), used).diagnosis;
-    std::vector<WrongDescription> again;
-    for (const lab::Finding& f : longer.findings) again.push_back(lab::as_wrong(f, first.t, first.after));
-    // A clock is no reason to doubt the rest, which is then reported alone.
+    const lab::Settings described = mended(known, options, config);
+    lab::Diagnosis longer = measured_after(first, options, described, used, false).diagnosis;
+    std::vector<WrongDescription> again = as_wrong(longer, first);
+    // A clock is no reason to doubt the rest, which is then reported alone. For it a part of the points will do.
     const auto is_clock = [](const WrongDescription& w) { return w.finding.cause.ends_with("_clock"); };
     const auto is_more = [&](const WrongDescription& w) { return known.stops(w) && !is_clock(w); };
     const bool clocks_alone = std::ranges::none_of(wrong, is_more) && std::ranges::none_of(again, &WrongDescription::spoils);
+    if (!clocks_alone) {
+      longer = measured_after(first, options, described, used).diagnosis;
+      again = as_wrong(longer, first);
+    }
     if (std::ranges::any_of(again, [&](const WrongDescription& w) { return known.stops(w); })) wrong = again;
     for (WrongDescription& w : wrong) w.is_mendable &= !clocks_alone || is_clock(w);
     for (WrongDescription& w : wrong) {
@@ -133,8 +144,13 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
       put_taken(known.mended, measured_after(first, options, mended(known, options, config), used).refinements);
     }
   } else {
-    // What is still wrong was not mended by that.
-    for (WrongDescription& w : wrong) w.is_mendable = false;
+    // What is still wrong was not mended by that, and changes no setting more; but it must stand up to more data as in the first round.
+    std::optional<lab::Diagnosis> longer;
+    for (WrongDescription& w : wrong) {
+      w.is_mendable = false;
+      if (!longer) longer = measured_after(w, options, mended(known, options, config), used).diagnosis;
+      if (lab::is_refuted(w.finding, *longer)) lab::refute(w);
+    }
   }
   known.wrong.insert(known.wrong.end(), wrong.begin(), wrong.end());
   ++known.round;

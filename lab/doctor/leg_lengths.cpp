@@ -14,7 +14,7 @@ constexpr double window = 1.0;                  // s, of a displacement
 constexpr double least_way = 0.12;              // m in a window
 constexpr double scale_tolerance = 0.035;       // soles that slip and roll take 1 %
 constexpr double agreed_tolerance = 0.013;      // where the robot stands as much higher
-constexpr double slip_tolerance = 0.08;         // of a way that is too short, where nothing tells the height
+constexpr double slip_tolerance = 0.08;         // of a way that is too short, where nothing tells the height, or that slipping makes
 constexpr double stance_tolerance = 0.02;       // links are known to 1 %
 constexpr double leg_height_tolerance = 0.028;  // m: ground that gives way takes 2 cm
 
@@ -197,6 +197,8 @@ bool Examination::way_contradicts_legs(const std::string& evidence) {
 
 // Legs of the same axes left and right turn the same when their joints are exchanged; only the way differs.
 bool Examination::accuse_exchanged_legs(double scale, const std::string& evidence) {
+  // Right legs that slip fall short by less than exchanged ones do.
+  if (std::abs(scale - 1) < slip_tolerance) return false;
   for (const LegHypothesis& h : leg_hypotheses(recorded_legs_, robot_)) {
     if (h.cause != "joints_swapped") continue;
     const LegWay way = measure_leg_way(&h);

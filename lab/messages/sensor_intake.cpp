@@ -1,5 +1,8 @@
 #include "lab/messages/sensor_intake.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "lab/messages/message_decoder.hpp"
 
 namespace kilvo::lab {
@@ -9,6 +12,11 @@ namespace {
 constexpr double remarkable_scatter = 1e-3;
 
 std::string plural(std::uint64_t count, const char* what) { return std::to_string(count) + " " + what + (count == 1 ? "" : "s"); }
+
+// A driver that has no such values may fill them with NaN.
+void clear_unknown(std::vector<double>& values) {
+  if (std::ranges::none_of(values, [](double v) { return std::isfinite(v); })) values.clear();
+}
 
 Time& stamp_in(Measurement& measurement) {
   return std::visit([](auto& m) -> Time& { return m.t; }, measurement);
@@ -30,12 +38,17 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
   tick_ = decoded->tick;
   gyro_ = decoded->gyro;
   counts_.absurd_point_times += decoded->absurd_times;
-  if (const auto* joints = std::get_if<JointSample>(&decoded->measurement)) joint_names_ = joints->names;
+  if (auto* joints = std::get_if<JointSample>(&decoded->measurement)) {
+    joint_names_ = joints->names;
+    clear_unknown(joints->velocity);
+    clear_unknown(joints->effort);
+  }
   if (auto* imu = std::get_if<ImuSample>(&decoded->measurement)) imu->gyro = imu->gyro.cwiseProduct(gyro_scale_);
   Time& stamp = stamp_in(decoded->measurement);
   if (stamp == Time{}) {
-    // A driver that does not stamp, as some do not their joints: the time of arrival is the best there is.
+    // A driver that does not stamp, as some do not their joints: the time of arrival is the best there is, of the last point of a sweep.
     stamp = arrived;
+    if (const auto* scan = std::get_if<LidarScan>(&decoded->measurement)) stamp -= Duration(offsets_of(*scan).last);
     ++counts_.unstamped;
   }
   stamp += from_seconds(time_offset_);
