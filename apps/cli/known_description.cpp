@@ -36,6 +36,11 @@ std::vector<WrongDescription> that_stopped(const KnownDescription& known, const 
   return out;
 }
 
+// More data than any of these had are those after the newest.
+WrongDescription last_of(const std::vector<WrongDescription>& wrong) {
+  return *std::ranges::max_element(wrong, {}, [](const WrongDescription& w) { return w.t; });
+}
+
 struct Measured {
   lab::Diagnosis diagnosis;
   std::vector<lab::Refinement> refinements;
@@ -112,7 +117,7 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
                             const std::filesystem::path& config, const std::vector<Sensor>& used) {
   std::vector<WrongDescription> wrong = that_stopped(known, found);
   if (known.round == 1) {
-    const WrongDescription first = wrong.front();
+    const WrongDescription first = last_of(wrong);
     // The same on more data, which measure what is wrong more precisely; and what is still off once that is mended.
     const lab::Settings described = mended(known, options, config);
     lab::Diagnosis longer = measured_after(first, options, described, used, false).diagnosis;
@@ -145,11 +150,10 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
     }
   } else {
     // What is still wrong was not mended by that, and changes no setting more; but it must stand up to more data as in the first round.
-    std::optional<lab::Diagnosis> longer;
+    const lab::Diagnosis longer = measured_after(last_of(wrong), options, mended(known, options, config), sound(used, known)).diagnosis;
     for (WrongDescription& w : wrong) {
       w.is_mendable = false;
-      if (!longer) longer = measured_after(w, options, mended(known, options, config), used).diagnosis;
-      if (lab::is_refuted(w.finding, *longer)) lab::refute(w);
+      if (lab::is_refuted(w.finding, longer)) lab::refute(w);
     }
   }
   known.wrong.insert(known.wrong.end(), wrong.begin(), wrong.end());

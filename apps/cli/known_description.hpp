@@ -2,7 +2,6 @@
 // that no setting corrects.
 #pragma once
 
-#include <algorithm>
 #include <vector>
 
 #include "apps/cli/run_recording.hpp"
@@ -19,12 +18,8 @@ struct KnownDescription {
   int round = 1;
   /// The data may still stop the run: as described, and as mended.
   bool is_judged() const { return round == 1 || (round == 2 && !mended.empty()); }
-  /// No round before has found it.
-  bool is_new(const lab::WrongDescription& found) const {
-    return std::ranges::none_of(wrong, [&found](const lab::WrongDescription& w) { return w.finding.cause == found.finding.cause; });
-  }
   /// A run with such a description is not to go on.
-  bool stops(const lab::WrongDescription& found) const { return found.spoils || (found.is_mendable && is_new(found)); }
+  bool stops(const lab::WrongDescription& found) const { return found.spoils || (round == 1 && found.is_mendable); }
 };
 
 /// Before the first round, where calibration.online asks for it: what the first minute of the recording says more exactly than the

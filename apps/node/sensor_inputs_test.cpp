@@ -81,7 +81,7 @@ TEST(SensorInputs, StampsOfAnImuThatComesInBurstsAreEvenAndThatIsReportedOnce) {
     const Time last = day + (k / 5 * 5 + 4) * period;
     live.receive(ImuSample{last, {0, 0, 1e-3 * (k % 7)}, {0, 0, 9.81}}, last + std::chrono::milliseconds(1));
   }
-  EXPECT_THAT(live.said, ElementsAre(HasSubstr("stamps scatter by")));
+  EXPECT_THAT(live.said, ElementsAre(HasSubstr("samples come in bursts")));
   ASSERT_EQ(live.count(Sensor::imu), 2000);
   for (std::size_t k = 1000; k < live.out.size(); ++k) {
     EXPECT_NEAR(to_seconds(stamp_of(live.out[k]) - stamp_of(live.out[k - 1])), to_seconds(period), 2e-4);

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "kilvo/sensors/time.hpp"
@@ -15,7 +16,7 @@ class ClockDrift {
   /// Of a stretch of some seconds that ends `at`: the least delay from stamp to arrival of the sensor, less that of the IMU, s. In order.
   void add(Time at, double delay);
 
-  /// To be added to the stamps from now on. Nothing is taken back of what had been lost before the drift was known.
+  /// To be added to the stamps from now on. Nothing is made good of what had been lost before the drift was known, nor taken back.
   Duration correction() const { return from_seconds(correction_); }
   /// Of the sensor's clock against the IMU's: positive, it is fast. 0 while no drift is known.
   double rate() const { return rate_; }
@@ -25,10 +26,12 @@ class ClockDrift {
     double at, delay;  // s
   };
   void add_block(const Block& block);
+  std::optional<double> slope() const;
 
   std::vector<Block> newest_;  // of the block that is being filled
   std::deque<Block> blocks_;
   Time begin_{};
+  double known_until_ = 0;  // s, from the beginning: the correction is of the drift until then
   double rate_ = 0, correction_ = 0;
 };
 

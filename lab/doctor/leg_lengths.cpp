@@ -198,7 +198,7 @@ bool Examination::way_contradicts_legs(const std::string& evidence) {
 // Legs of the same axes left and right turn the same when their joints are exchanged; only the way differs.
 bool Examination::accuse_exchanged_legs(double scale, const std::string& evidence) {
   // Right legs that slip fall short by less than exchanged ones do.
-  if (std::abs(scale - 1) < slip_tolerance) return false;
+  if (scale < 1 && 1 - scale < slip_tolerance) return false;
   for (const LegHypothesis& h : leg_hypotheses(recorded_legs_, robot_)) {
     if (h.cause != "joints_swapped") continue;
     const LegWay way = measure_leg_way(&h);

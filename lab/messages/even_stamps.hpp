@@ -1,46 +1,64 @@
 // Stamps of a sensor that measures without a pause, as even as its measuring is.
 //
 // A LiDAR and an IMU are paced by oscillators of their own. Where the computer stamps a message when it notices it, the stamps scatter by
-// milliseconds, or come in bursts, and contradict each other: a sweep begins before the one before has ended, an IMU has measured twice
-// within half a period. No sensor does that. Then a straight line through the stamps of the last messages tells better when each was
-// measured than its own stamp. Stamps that show no such contradiction are kept: what scatters there may be the sensor.
+// milliseconds, or come in bursts, and contradict each other: a sweep begins before the one before has ended, an IMU has measured five
+// times at once. No sensor does that. Stamps that show no such contradiction are kept to the last bit: what scatters there may be the
+// sensor.
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 
 #include "kilvo/sensors/time.hpp"
 
 namespace kilvo::lab {
 
-class EvenStamps {
+/// Sweeps whose stamps scatter: a straight line through the last minute of stamps tells better when each was measured than its own.
+class EvenSweeps {
  public:
-  /// Of each sweep in the order of arrival: its stamp, and when its first and its last point were measured by it. Returns the stamp to
-  /// use: the mean of the line.
-  Time follow_sweep(Time stamp, Time first, Time last);
+  /// Of each sweep in the order of arrival: its stamp, and when its first and its last point were measured by it. Returns the stamp to use.
+  Time follow(Time stamp, Time first, Time last);
 
-  /// Of each sample of an IMU. Returns the stamp to use: the line of those that waited least, were their delays anything up to the longest.
-  Time follow_sample(Time stamp);
-
-  /// s, standard deviation of the stamps from even ones, where those are used.
+  /// s, standard deviation of the stamps from the line, where that is used.
   std::optional<double> scatter() const;
 
  private:
-  /// The stamp by the line; nothing where the stamp is to be used as it is. `contradiction` with the one before: 1, -1 the contrary, 0
-  /// neither. `limit`: s, farther from the line none can be.
-  std::optional<Time> follow(Time stamp, double contradiction, double limit);
   void restart(Time stamp);
-  void count_what_is_missing();
-  bool is_even() const;
+  double contradiction_of(Time stamp, Time first, Time last);
+  std::optional<Time> off_line(Time stamp, Time predicted, double surprise);
+  void learn(Time stamp, Time predicted, double steps, double contradiction);
+  void decide();
 
-  Time expected_{};  // of the message that was followed last, by the line
+  Time expected_{};  // of the sweep that was followed last, by the line
   double period_ = 0;
-  std::uint64_t count_ = 0;  // messages of this line
+  std::uint64_t count_ = 0;  // sweeps of this line
   int strangers_ = 0;        // in a row that do not fit
+  bool is_used_ = false;
   Time last_stamp_{}, last_end_{};
-  // Over the last messages: mean squares of the stamps from the line and of the steps between them, their mean distance from the line, and
-  // how many contradict the one before.
-  double deviation2_ = 0, step2_ = 0, late_ = 0, contradictions_ = 0;
+  // Over the last sweeps: mean squares of the stamps from the line and of the steps between them, mean product of every other step, time
+  // between two sweeps, and how many begin too early.
+  double deviation2_ = 0, step2_ = 0, alternating_ = 0, gap_ = 0, contradictions_ = 0;
+  double step_ = 0, step_before_ = 0;  // s, beyond the period
+};
+
+/// Samples of an IMU that are handed over several at a time: the newest of a burst has waited least, those before it are a period apart.
+class EvenSamples {
+ public:
+  /// Of each sample in the order of arrival, its stamp. Returns the stamp to use, which is never later.
+  Time follow(Time stamp);
+
+  /// s, by how much the stamps are late in the mean, where others are used.
+  std::optional<double> lateness() const { return is_used_ ? std::optional(late_) : std::nullopt; }
+
+ private:
+  void restart(Time stamp);
+  void look_at_step(double step);
+
+  std::deque<Time> stamps_;  // the newest
+  std::optional<Time> last_, given_;
+  double period_ = 0, at_once_ = 0, late_ = 0;  // s; share of samples that come at once; s
+  bool is_used_ = false;
 };
 
 }  // namespace kilvo::lab

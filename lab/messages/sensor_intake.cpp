@@ -56,11 +56,9 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
     // A message that comes twice is none that was measured later.
     const bool is_repeated = newest_imu_ && newest_imu_->t == imu->t && newest_imu_->gyro == imu->gyro && newest_imu_->accel == imu->accel;
     newest_imu_ = *imu;
-    if (!is_repeated) imu_stamp_ = even_stamps_.follow_sample(stamp);
+    if (!is_repeated) imu_stamp_ = even_samples_.follow(stamp);
     stamp = imu_stamp_;
   }
-  // What a message says beside its IMU was measured with it.
-  if (gyro_ && std::holds_alternative<JointSample>(decoded->measurement)) stamp = even_stamps_.follow_sample(stamp);
   if (auto* scan = std::get_if<LidarScan>(&decoded->measurement)) {
     const std::size_t repeated = repeated_.take_out(*scan);
     counts_.repeated_points += repeated;
@@ -68,9 +66,10 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
       take_back("repeated");
       return std::nullopt;
     }
-    stamp = even_stamps_.follow_sweep(stamp, begin_of(*scan), end_of(*scan));
+    stamp = even_sweeps_.follow(stamp, begin_of(*scan), end_of(*scan));
   }
-  if (const double scatter = even_stamps_.scatter().value_or(0); scatter > remarkable_scatter) scatter_ = scatter;
+  if (const double scatter = even_sweeps_.scatter().value_or(0); scatter > remarkable_scatter) scatter_ = scatter;
+  if (even_samples_.lateness()) lateness_ = *even_samples_.lateness();
   auto* joints = std::get_if<JointSample>(&decoded->measurement);
   if (joints == nullptr) return std::move(decoded->measurement);
   auto whole = assembly_.join(std::move(*joints), arrived);
@@ -92,8 +91,12 @@ std::vector<std::string> SensorIntake::findings() const {
   if (scatter_ > 0) {
     texts.push_back(
         "stamps scatter by " + std::to_string(1e3 * scatter_) +
-        " ms and contradict each other, though the sensor measures evenly: the times of a line through them are used; the driver "
-        "should stamp by the sensor's clock");
+        " ms, and sweeps begin before the last has ended: the times of a line through them are used; the driver should stamp by "
+        "the sensor's clock");
+  }
+  if (lateness_ > 0) {
+    texts.push_back("samples come in bursts with stamps that are late by " + std::to_string(1e3 * lateness_) +
+                    " ms in the mean: even times are used; the driver should stamp by the sensor's clock");
   }
   return texts;
 }

@@ -59,7 +59,8 @@ class SensorIntake {
   std::vector<std::string> findings() const;
   /// How many they are.
   int finding_count() const {
-    return (scatter_ > 0 ? 1 : 0) + (counts_.repeated_points > 0 ? 1 : 0) + (counts_.absurd_point_times > 0 ? 1 : 0);
+    return (scatter_ > 0 ? 1 : 0) + (lateness_ > 0 ? 1 : 0) + (counts_.repeated_points > 0 ? 1 : 0) +
+           (counts_.absurd_point_times > 0 ? 1 : 0);
   }
 
   const SensorCounts& counts() const { return counts_; }
@@ -75,10 +76,11 @@ class SensorIntake {
   JointNames joint_names_;  // of the message that was taken last
   JointAssembly assembly_;
   RepeatedPoints repeated_;
-  EvenStamps even_stamps_;
+  EvenSweeps even_sweeps_;
+  EvenSamples even_samples_;
   std::optional<ImuSample> newest_imu_;  // with the stamp that it came with
   Time imu_stamp_{};                     // that it was given
-  double scatter_ = 0;                   // s, of stamps for which even ones were used; 0: of none, or not worth a word
+  double scatter_ = 0, lateness_ = 0;    // s, of stamps for which even ones were used; 0: of none, or too little to be reported
   SensorCounts counts_;
   std::string first_fault_, newest_fault_;
   std::optional<std::uint32_t> tick_;
