@@ -119,14 +119,15 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
   if (known.round == 1) {
     const WrongDescription first = last_of(wrong);
     // The same on more data, which measure what is wrong more precisely; and what is still off once that is mended.
-    const lab::Settings described = mended(known, options, config);
-    lab::Diagnosis longer = measured_after(first, options, described, used, false).diagnosis;
-    std::vector<WrongDescription> again = as_wrong(longer, first);
     // A clock is no reason to doubt the rest, which is then reported alone. For it a part of the points will do.
     const auto is_clock = [](const WrongDescription& w) { return w.finding.cause.ends_with("_clock"); };
     const auto is_more = [&](const WrongDescription& w) { return known.stops(w) && !is_clock(w); };
-    const bool clocks_alone = std::ranges::none_of(wrong, is_more) && std::ranges::none_of(again, &WrongDescription::spoils);
-    if (!clocks_alone) {
+    const lab::Settings described = mended(known, options, config);
+    bool clocks_alone = std::ranges::none_of(wrong, is_more);
+    lab::Diagnosis longer = measured_after(first, options, described, used, !clocks_alone).diagnosis;
+    std::vector<WrongDescription> again = as_wrong(longer, first);
+    if (clocks_alone && std::ranges::any_of(again, &WrongDescription::spoils)) {
+      clocks_alone = false;
       longer = measured_after(first, options, described, used).diagnosis;
       again = as_wrong(longer, first);
     }
@@ -149,7 +150,7 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
       put_taken(known.mended, measured_after(first, options, mended(known, options, config), used).refinements);
     }
   } else {
-    // What is still wrong was not mended by that, and changes no setting more; but it must stand up to more data as in the first round.
+    // What is still wrong must stand up to more data as in the first round, but no more settings are changed for it.
     const lab::Diagnosis longer = measured_after(last_of(wrong), options, mended(known, options, config), sound(used, known)).diagnosis;
     for (WrongDescription& w : wrong) {
       w.is_mendable = false;

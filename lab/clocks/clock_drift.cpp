@@ -36,20 +36,17 @@ Line line_through(const Blocks& blocks) {
 }  // namespace
 
 void ClockDrift::add(Time at, double delay) {
+  if (at < newest_until_) *this = ClockDrift();  // another recording
   if (newest_.empty() && blocks_.empty()) begin_ = at;
+  newest_until_ = at;
   const double t = to_seconds(at - begin_);
-  if (!newest_.empty() && t < newest_.back().at) {  // another recording
-    *this = ClockDrift();
-    begin_ = at;
-  }
   if (!newest_.empty() && t - newest_.front().at > longest_block) newest_.clear();
-  newest_.push_back({to_seconds(at - begin_), delay});
+  newest_.push_back({t, delay});
   if (newest_.size() < per_block) return;
-  const double end = newest_.back().at;
   std::ranges::nth_element(newest_, newest_.begin() + per_block / 2, {}, &Block::delay);
   const double median = newest_[per_block / 2].delay;
   newest_.clear();
-  add_block({end, median});
+  add_block({t, median});
 }
 
 std::optional<double> ClockDrift::slope() const {
@@ -68,7 +65,7 @@ void ClockDrift::add_block(const Block& block) {
   const auto drift = slope();
   if (drift) {
     // A drift that was known before has gone on while delays that stepped hid it.
-    if (known_until_ > 0) correction_ += *drift * (block.at - known_until_);
+    if (known_until_) correction_ += *drift * (block.at - *known_until_);
     known_until_ = block.at;
   }
   rate_ = -drift.value_or(0);

@@ -30,8 +30,8 @@ class ClockDrift {
 
   std::vector<Block> newest_;  // of the block that is being filled
   std::deque<Block> blocks_;
-  Time begin_{};
-  double known_until_ = 0;  // s, from the beginning: the correction is of the drift until then
+  Time begin_{}, newest_until_{};
+  std::optional<double> known_until_;  // s, from the beginning: the correction is of the drift until then
   double rate_ = 0, correction_ = 0;
 };
 

@@ -14,7 +14,7 @@ constexpr Duration most_early = std::chrono::seconds(2), most_late = std::chrono
 // Another clock is believed after so long, and so many messages.
 constexpr Duration evidence = std::chrono::seconds(1);
 constexpr std::size_t fewest = 3;
-// Of which least delays are taken.
+// Of each stretch of time the least delay is taken.
 constexpr Duration stretch = std::chrono::seconds(2);
 // Sensors whose clocks seem so near to each other have one and the same: what is between them are their delays. Devices that have
 // been switched on at different times differ by more.

@@ -269,6 +269,17 @@ TEST(SensorClocks, ThatDriftAreFollowedThroughAPauseAndAStepOfTheDelay) {
   EXPECT_NEAR(to_seconds(drift.correction()), -5e-5 * 6000, 8e-3);
 }
 
+TEST(SensorClocks, ADriftOfAnotherRecordingIsForgotten) {
+  for (const int stretches : {200, 203}) {  // whole blocks, and one that is being filled
+    ClockDrift drift;
+    for (int k = 0; k < stretches; ++k) drift.add(day + seconds(2 * k), 0.003 - 1e-4 * k);
+    EXPECT_LT(to_seconds(drift.correction()), -0.01);
+    drift.add(day, 0.003);
+    EXPECT_EQ(drift.correction(), Duration(0));
+    EXPECT_EQ(drift.rate(), 0);
+  }
+}
+
 TEST(SensorClocks, DelaysThatStepOrGrowIntoAQueueAreNoDrift) {
   Robot robot;
   robot.length = seconds(300);

@@ -4,14 +4,13 @@
 #include <cmath>
 
 #include "lab/messages/message_decoder.hpp"
+#include "lab/messages/plural.hpp"
 
 namespace kilvo::lab {
 namespace {
 
 // Stamps that scatter by less are everyday, s.
 constexpr double remarkable_scatter = 1e-3;
-
-std::string plural(std::uint64_t count, const char* what) { return std::to_string(count) + " " + what + (count == 1 ? "" : "s"); }
 
 // A driver that has no such values may fill them with NaN.
 void clear_unknown(std::vector<double>& values) {

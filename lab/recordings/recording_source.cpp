@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "lab/messages/input_error.hpp"
+#include "lab/messages/plural.hpp"
 #include "lab/messages/point_time_search.hpp"
 #include "lab/recordings/recording_file.hpp"
 
@@ -25,8 +26,6 @@ SensorClocks clocks_of(const RecordingOptions& options) {
 }
 
 Time after(Time begin, double seconds) { return seconds < for_ever ? begin + from_seconds(std::max(seconds, 0.0)) : Time::max(); }
-
-std::string plural(std::uint64_t count, const std::string& what) { return std::to_string(count) + " " + what + (count == 1 ? "" : "s"); }
 
 }  // namespace
 
