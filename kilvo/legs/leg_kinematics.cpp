@@ -24,7 +24,7 @@ struct LegKinematics::Chains {
   LegsMount mount;
   std::array<JointChain, 2> legs;
   JointNames message_names;  // that the places are for
-  // For messages without velocities.
+  // For messages without velocities, or with wrong ones.
   std::vector<double> last_position, velocity;
   Time last_t{};
 
@@ -50,7 +50,7 @@ std::optional<std::string> LegKinematics::Chains::look_up_joints(const JointName
 }
 
 const std::vector<double>* LegKinematics::Chains::velocity_of(const JointSample& s) {
-  if (s.velocity.size() == s.position.size()) return &s.velocity;
+  if (s.velocity.size() == s.position.size() && mount.velocities == "messages") return &s.velocity;
   const double dt = to_seconds(s.t - last_t);
   constexpr double smoothing = 0.001;  // s, of the low pass over the differences
   velocity.resize(s.position.size());
@@ -74,9 +74,7 @@ const std::vector<double>* LegKinematics::Chains::velocity_of(const JointSample&
 FootPose LegKinematics::Chains::pose_of(std::size_t side, const JointSample& s, const std::vector<double>& velocity_of_all) {
   FootPose out;
   if (!by_joints) {
-    const auto triple = [side](const std::vector<double>& all) {
-      return Eigen::Vector3d(all[3 * side], all[3 * side + 1], all[3 * side + 2]);
-    };
+    const auto triple = [side](const std::vector<double>& all) { return Eigen::Vector3d(&all[3 * side]); };
     out.corners = 1;
     const Eigen::Vector3d down(0, 0, -mount.sole_offset);
     out.p[0] = mount.T_imu_feet * (triple(s.position) + down);

@@ -226,6 +226,25 @@ TEST(LegKinematics, WithoutVelocitiesTheDifferencesApproachTheTrueOnes) {
   EXPECT_LT(last, 0.01);
 }
 
+TEST(LegKinematics, WrongVelocitiesAreNotLookedAtWhereThoseOfThePositionsAreWanted) {
+  test::Random random(7);
+  Robot robot = test::biped(random);
+  robot.legs.velocities = "positions";
+  LegKinematics wrong(robot), none(robot);
+  JointSample s = test::random_joints(random);
+  for (int i = 0; i < 20; ++i) {
+    s.t += std::chrono::milliseconds(1);
+    for (double& q : s.position) q += 0.001;
+    JointSample without = s;
+    without.velocity.clear();
+    if (i > 0) {
+      EXPECT_EQ(distance(feet_of(wrong, s), feet_of(none, without)), 0);
+    } else {
+      EXPECT_EQ(fault_of(wrong, s), fault_of(none, without));
+    }
+  }
+}
+
 TEST(LegKinematics, WithoutVelocitiesAGapOrAnotherOrderOfTheJointsIsNoMotion) {
   test::Random random(11);
   LegKinematics legs(test::biped(random));

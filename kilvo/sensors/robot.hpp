@@ -39,16 +39,18 @@ struct ImuMount {
 };
 
 struct LegsMount {
-  std::string type = "joints";  // joints | feet (the two-feet message)
-  double rate = 1000;           // Hz, nominal
-  double time_offset = 0;       // s, added to the stamps
-  SE3 T_imu_feet;               // two-feet message: its frame in the IMU frame
-  double sole_offset = 0;       // two-feet message: from its foot point down to the sole, m
+  std::string type = "joints";          // joints | feet (the two-feet message)
+  std::string velocities = "messages";  // messages | positions
+  double rate = 1000;                   // Hz, nominal
+  double time_offset = 0;               // s, added to the stamps
+  SE3 T_imu_feet;                       // two-feet message: its frame in the IMU frame
+  double sole_offset = 0;               // two-feet message: from its foot point down to the sole, m
 
   static constexpr auto fields() {
     return std::tuple{
         Field{"type", &LegsMount::type, "-",
               "what the leg message holds: joints (sensor_msgs/JointState by name) or feet (two foot positions)"},
+        Field{"velocities", &LegsMount::velocities, "-", "of the joints: those in the messages, or the change of the positions"},
         Field{"rate", &LegsMount::rate, "Hz", "nominal rate of the leg messages"},
         Field{"time_offset", &LegsMount::time_offset, "s", "added to the stamps of the leg messages"},
         Field{"sole_offset", &LegsMount::sole_offset, "m", "two-feet message: distance from its foot point down to the sole"}};

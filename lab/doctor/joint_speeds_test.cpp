@@ -30,13 +30,20 @@ class JointSpeeds : public testing::Test {
     out.use = {true, true, false, false};
     return out;
   }
-  static Diagnosis judged(const std::function<void(LegSample&)>& change) {
-    Recorded changed = recorded();
-    for (LegSample& s : changed.legs) change(s);
+  static Recorded changed(const std::function<void(LegSample&)>& change) {
+    Recorded out = recorded();
+    for (LegSample& s : out.legs) change(s);
+    return out;
+  }
+  static Robot walked_robot() {
     const std::string urdf = std::string(KILVO_SOURCE_DIR) + "/config/robots/sim.urdf";
     Robot robot = parse_settings(simulated_config(config(), urdf), "simulated", ".").robot;
     robot.urdf = urdf_of(config().shape);
-    return Examination(changed, robot).run();
+    return robot;
+  }
+  static Diagnosis judged(const std::function<void(LegSample&)>& change) {
+    const Recorded messages = changed(change);
+    return Examination(messages, walked_robot()).run();
   }
   static std::vector<std::string> causes(const std::function<void(LegSample&)>& change) {
     std::vector<std::string> out;
@@ -82,12 +89,45 @@ TEST_F(JointSpeeds, ThatAFilterMakesSmallerOrThatAreAbsentAreNot) {
 }
 
 // What does not follow the positions at all has no unit.
-TEST_F(JointSpeeds, OfNoiseAreNotJudged) {
+TEST_F(JointSpeeds, OfNoiseAreNamedAsNoVelocities) {
   int k = 0;
-  EXPECT_THAT(causes([&k](LegSample& s) {
-                for (double& v : s.velocity) v = 5 * std::sin(++k * 12.9898);
-              }),
-              testing::IsEmpty());
+  const Diagnosis diagnosis = judged([&k](LegSample& s) {
+    for (double& v : s.velocity) v = 5 * std::sin(++k * 12.9898);
+  });
+  ASSERT_EQ(diagnosis.findings.size(), 1u);
+  EXPECT_EQ(diagnosis.findings[0].cause, "joint_velocity");
+  EXPECT_THAT(diagnosis.findings[0].text, testing::HasSubstr("do not follow"));
+}
+
+TEST_F(JointSpeeds, InAnotherOrderThanThePositionsAreNamedWithTheSettingThatDoesWithoutThem) {
+  const Diagnosis diagnosis = judged([](LegSample& s) { std::ranges::rotate(s.velocity, s.velocity.begin() + 1); });
+  ASSERT_EQ(diagnosis.findings.size(), 1u);
+  EXPECT_EQ(diagnosis.findings[0].cause, "joint_velocity");
+  ASSERT_EQ(diagnosis.findings[0].changes.size(), 1u);
+  EXPECT_EQ(diagnosis.findings[0].changes[0].key, "legs.velocities");
+  EXPECT_EQ(diagnosis.findings[0].changes[0].value, "positions");
+}
+
+TEST_F(JointSpeeds, ThatAreNotUsedAreNotJudged) {
+  Robot robot = walked_robot();
+  robot.legs.velocities = "positions";
+  const Recorded messages = changed(times(20));
+  EXPECT_TRUE(Examination(messages, robot).run().good());
+}
+
+TEST_F(JointSpeeds, OfOneJointThatAreAnothersAreNamed) {
+  const Diagnosis diagnosis = judged([](LegSample& s) { s.velocity[3] *= -1; });
+  ASSERT_EQ(diagnosis.findings.size(), 1u);
+  EXPECT_EQ(diagnosis.findings[0].cause, "joint_velocity");
+}
+
+// An encoder that jumps now and then is none whose velocities are wrong.
+TEST_F(JointSpeeds, BesidePositionsThatJumpAreNotNamed) {
+  int k = 0;
+  const Diagnosis diagnosis = judged([&k](LegSample& s) {
+    if (++k % 97 == 0) s.position[static_cast<std::size_t>(k) % s.position.size()] += 1;
+  });
+  for (const Finding& finding : diagnosis.findings) EXPECT_NE(finding.cause, "joint_velocity");
 }
 
 }  // namespace joint_speeds_test

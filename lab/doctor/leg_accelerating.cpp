@@ -7,6 +7,70 @@
 #include "lab/doctor/leg_hypotheses.hpp"
 
 namespace kilvo::lab {
+namespace {
+
+/// Of a joint over a tenth of a second, rad: by its positions and by the velocities that came with them.
+struct JointTurn {
+  double by_position = 0, by_velocity = 0, seconds = 0;
+};
+
+struct JointTurns {
+  std::size_t joint = 0;  // its place in the messages
+  std::vector<JointTurn> turns;
+};
+
+std::vector<JointTurns> joint_turns(const std::vector<LegSample>& legs, const std::vector<std::size_t>& joints) {
+  constexpr double longest = 0.03, span = 0.1;  // s: beyond is a gap; of a turn, over which jitter of stamps and encoders tells little
+  std::vector<JointTurns> out;
+  for (const std::size_t joint : joints) {
+    out.push_back({joint, {}});
+    double by_velocity = 0;
+    for (std::size_t k = 1, begin = 0; k < legs.size(); ++k) {
+      const LegSample &a = legs[k - 1], &b = legs[k];
+      const double dt = b.t - a.t;
+      if (!(dt > 0 && dt < longest) || a.velocity.size() != a.position.size() || b.velocity.size() != b.position.size()) {
+        begin = k, by_velocity = 0;
+        continue;
+      }
+      by_velocity += 0.5 * (a.velocity[joint] + b.velocity[joint]) * dt;
+      if (b.t - legs[begin].t < span) continue;
+      out.back().turns.push_back({b.position[joint] - legs[begin].position[joint], by_velocity, b.t - legs[begin].t});
+      begin = k, by_velocity = 0;
+    }
+  }
+  return out;
+}
+
+/// In how many of a joint's larger turns the velocities have the direction of the positions: positions that jump, and a wrong unit, change
+/// little of that.
+struct Directions {
+  double count = 0, same = 0;
+  Directions& operator+=(const Directions& other) {
+    count += other.count, same += other.same;
+    return *this;
+  }
+  double share() const { return same / count; }
+  bool are_not_those_of_positions(double deviations) const {
+    constexpr double least_share = 0.75;  // of sound ones 0.9 to 1, by chance 0.5
+    return count > 0 && share() + deviations / 2 / std::sqrt(count) < least_share;
+  }
+};
+
+Directions directions_of(const JointTurns& joint) {
+  constexpr double least_rate = 0.1;  // rad/s, rms: below, noise decides
+  double squares = 0, time = 0;
+  for (const JointTurn& turn : joint.turns) squares += turn.by_position * turn.by_position, time += turn.seconds * turn.seconds;
+  Directions out;
+  if (!(time > 0) || squares < least_rate * least_rate * time) return out;
+  for (const JointTurn& turn : joint.turns) {
+    if (turn.by_position * turn.by_position * static_cast<double>(joint.turns.size()) < squares) continue;
+    ++out.count;
+    if (turn.by_position * turn.by_velocity > 0) ++out.same;
+  }
+  return out;
+}
+
+}  // namespace
 
 LegAcceleration Examination::leg_acceleration(const LegHypothesis* hypothesis, const SO3& R_link_imu, double offset) const {
   // The acceleration is not what was measured.
@@ -51,40 +115,49 @@ bool Examination::try_acceleration_hypotheses() {
   return true;
 }
 
-// The velocities that the messages give against the differences of their positions.
+// The velocities that the messages give against the change of the positions that they come with.
 void Examination::examine_joint_speeds() {
-  double both = 0, turned = 0, given = 0, n = 0;
+  if (robot_.legs.velocities != "messages") return;
   const std::vector<std::size_t> joints = recorded_legs_.joints_that_matter(robot_);
-  constexpr double longest = 0.03;  // s: a step takes ten times as long
-  for (std::size_t k = 1; k < recorded_.legs.size(); ++k) {
-    const LegSample &a = recorded_.legs[k - 1], &b = recorded_.legs[k];
-    const double dt = b.t - a.t;
-    if (!(dt > 0 && dt < longest) || a.velocity.size() != a.position.size() || b.velocity.size() != b.position.size()) continue;
-    // Weighed by the time: of stamps that jitter the differences of a short time tell little.
-    for (const std::size_t i : joints) {
-      const double turn = b.position[i] - a.position[i];
-      const double by_velocity = 0.5 * (a.velocity[i] + b.velocity[i]) * dt;
-      both += turn * by_velocity;
-      given += by_velocity * by_velocity;
-      turned += turn * turn;
-      n += dt * dt;
+  const std::vector<JointTurns> turns = joint_turns(recorded_.legs, joints);
+  double both = 0, turned = 0, given = 0, time = 0;
+  Directions all;
+  const JointTurns* other = nullptr;  // whose velocity is another one's
+  for (const JointTurns& joint : turns) {
+    for (const JointTurn& turn : joint.turns) {
+      both += turn.by_position * turn.by_velocity;
+      turned += turn.by_position * turn.by_position;
+      given += turn.by_velocity * turn.by_velocity;
+      time += turn.seconds * turn.seconds;
     }
+    const Directions own = directions_of(joint);
+    all += own;
+    if (own.are_not_those_of_positions(sure_among(joints.size()))) other = &joint;
   }
   constexpr double least_rate = 0.1, least_ratio = 0.5, most_ratio = 2;  // rad/s, -: filters of a driver take less
-  if (!(n > 0) || turned < least_rate * least_rate * n) return;
+  if (!(time > 0) || turned < least_rate * least_rate * time) return;
   const double ratio = both / turned;
-  const std::string detail = fmt::format("the velocities are {:.3g} times the change of the positions", ratio);
+  std::string detail = fmt::format("the velocities are {:.3g} times the change of the positions", ratio);
   // Positions that jump differ by more than any velocity.
   constexpr double clearly = 0.5;  // squared correlation
-  const bool alike = both * both > clearly * turned * given;
-  if ((given > 0 && !alike) || (ratio > least_ratio && ratio < most_ratio)) {
+  const bool alike = both * both > clearly * turned * given, is_ratio = ratio > least_ratio && ratio < most_ratio;
+  const bool follow = other == nullptr && !all.are_not_those_of_positions(sure);
+  if (given > 0 && follow && (!alike || is_ratio)) {
     check(Sensor::legs, "velocities of the joints", alike ? Check::Verdict::good : Check::Verdict::unknown, detail);
     diagnosis_.checks.back().at_rest = true;
     return;
   }
-  Finding f{Sensor::legs, "joint_velocity", {}, detail, "the driver must publish rad/s, or no velocities at all", ratio, {}, {}, true};
+  if (!follow) {
+    const Directions worst = other != nullptr ? directions_of(*other) : all;
+    detail = fmt::format("{} in {:.0f} % of {} turns they have the direction in which the positions change",
+                         other != nullptr ? recorded_.joint_names[other->joint] + ":" : "of all joints", 100 * worst.share(), worst.count);
+  }
+  Finding f{Sensor::legs, "joint_velocity", {}, detail, "the driver must publish rad/s, or legs.velocities: positions", ratio, {}, {},
+            true};
   f.text = given == 0 ? "the messages of the legs have no velocities but zeros"
-                      : fmt::format("the velocities of the joints are not rad/s: {:.3g} times what they should be", ratio);
+           : follow   ? fmt::format("the velocities of the joints are not rad/s: {:.3g} times what they should be", ratio)
+                      : "the velocities of the joints do not follow their positions";
+  f.changes = {{"legs.velocities", "positions"}};
   find(std::move(f));
 }
 

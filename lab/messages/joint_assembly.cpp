@@ -17,6 +17,7 @@ std::optional<JointSample> JointAssembly::join(JointSample message, Time arrived
   if (message.names != names_) look_up(message.names);
   if (!legs_ || arrived < *legs_ || found_ > 0) legs_ = arrived;
   if (found_ == 0) return arrived - *legs_ > patience ? std::optional(std::move(message)) : std::nullopt;
+  clear_unknown_velocities(message);
   comes_whole_ = comes_whole_ || found_ == needed_.size();
   if (comes_whole_) return message;
   note(message);
@@ -43,6 +44,18 @@ void JointAssembly::look_up(const JointNames& names) {
     places_[i] = static_cast<std::size_t>(it - names.begin());
     ++found_;
   }
+}
+
+void JointAssembly::clear_unknown_velocities(JointSample& message) {
+  if (knows_velocities_ || message.velocity.size() != message.position.size()) return;
+  bool are_finite = true, moves = false;
+  for (const auto& place : places_) {
+    if (!place) continue;
+    are_finite = are_finite && std::isfinite(message.velocity[*place]);
+    moves = moves || message.velocity[*place] != 0;
+  }
+  knows_velocities_ = are_finite && moves;
+  if (!knows_velocities_) message.velocity.clear();
 }
 
 void JointAssembly::note(const JointSample& part) {

@@ -19,6 +19,7 @@ class JointAssembly {
   /// Messages in the order of their arrival. A message that holds all joints is given back as it is; a part gives the sample that it
   /// completes, or nothing; one without any of them (arms) nothing. After one second without a whole sample parts are given back as they
   /// are, and after one without any joint of the legs all others: what is missing is for the estimator to say.
+  /// Velocities of the legs that are NaN or zero from the first message on are left out: their driver does not know them.
   std::optional<JointSample> join(JointSample message, Time arrived);
 
   /// Whether the last message held joints of the legs.
@@ -36,6 +37,7 @@ class JointAssembly {
     bool has_velocity = false, has_effort = false, is_used = false;
   };
   void look_up(const JointNames& names);
+  void clear_unknown_velocities(JointSample& message);
   void note(const JointSample& part);
   bool is_whole(Time newest, Duration interval) const;
   JointSample sample(Time newest);
@@ -46,6 +48,7 @@ class JointAssembly {
   std::vector<std::optional<std::size_t>> places_;  // in it, by joint
   std::size_t found_ = 0;                           // joints in it
   bool comes_whole_ = false;                        // a message held all joints
+  bool knows_velocities_ = false;                   // a message had some of the legs
   std::optional<Time> legs_;                        // arrival of the last message that held joints of the legs, or of the first of all
   std::optional<Time> whole_;                       // arrival of what made the last sample, or of the first part
   std::optional<Time> given_;                       // stamp of the last sample

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <limits>
 
 namespace kilvo::lab {
 namespace joint_assembly_test {
@@ -94,6 +95,21 @@ TEST(JointAssembly, JitterOfTheStampsCostsFewSamples) {
     messages.push_back(part(right, 2 * i + 0.7 + 0.6 * std::sin(53.0 * i + 1)));
   }
   EXPECT_GE(joined(assembly, messages).size(), 430U);
+}
+
+TEST(JointAssembly, VelocitiesThatADriverDoesNotKnowAreLeftOut) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  JointAssembly assembly(both);
+  const auto velocities = [&](double ms, std::vector<double> velocity) {
+    JointSample message = part(JointNames{"left_hip", "left_knee", "arm", "right_hip", "right_knee"}, ms);
+    message.velocity = std::move(velocity);
+    return assembly.join(message, message.t).value_or(JointSample{}).velocity;
+  };
+  EXPECT_THAT(velocities(0, {0, 0, 1, 0, 0}), ElementsAre());
+  EXPECT_THAT(velocities(2, {nan, 1, 1, nan, 1}), ElementsAre());
+  EXPECT_THAT(velocities(4, {0, 1, nan, 0, 1}).size(), 5U);
+  EXPECT_THAT(velocities(6, {0, 0, 0, 0, 0}), ElementsAre(0, 0, 0, 0, 0)) << "a robot that stands";
+  EXPECT_THAT(velocities(8, {nan, 0, 0, 0, 0}).size(), 5U) << "is refused, not guessed";
 }
 
 TEST(JointAssembly, ASlowWaistDoesNotHoldBackFastLegs) {

@@ -122,6 +122,7 @@ const std::vector<std::string>& choices_of(std::string_view key) {
   static const std::vector<std::string> none;
   static const std::map<std::string_view, std::vector<std::string>> table{
       {"legs.type", {"joints", "feet"}},
+      {"legs.velocities", {"messages", "positions"}},
       {"legs.clock", {"stamp", "arrival", "estimated"}},
       {"legs.contact", {"kilvo", "paper", "variance", "force"}},
       {"legs.adaptation", {"foot", "row", "none"}},
