@@ -47,10 +47,26 @@ std::optional<History> History::doubted(Time end, const std::optional<Eigen::Vec
   return out;
 }
 
-History History::moved(double turned, double moved) const {
+History History::moved(const SE3& by, double turned, double moved) const {
   History out(*this);
-  out.base_.P.diagonal().segment<3>(at::R).array() += turned * turned;
-  out.base_.P.diagonal().segment<3>(at::p).array() += moved * moved;
+  State& x = out.base_.x;
+  x.R = by.R * x.R;
+  x.p = by * x.p;
+  x.v = by.R * x.v;
+  Covariance with = Covariance::Identity();
+  for (const int part : {at::p, at::v, at::pcl, at::pcr}) with.block<3, 3>(part, part) = by.R.matrix();
+  Covariance& P = out.base_.P = with * base_.P * with.transpose();
+  Eigen::Matrix<double, at::size, 6> off = Eigen::Matrix<double, at::size, 6>::Zero();
+  off.block<3, 3>(at::R, 0).diagonal().setConstant(turned);
+  off.block<3, 3>(at::p, 3).diagonal().setConstant(moved);
+  for (const std::size_t side : {0, 1}) {
+    const int pc = at::pcl + 3 * static_cast<int>(side);
+    if (P.block<3, 3>(pc, pc).isZero(0)) continue;  // it does not stand
+    x.pc[side] = by * x.pc[side];
+    off.block<3, 3>(pc, 0) = -turned * x.R.matrix() * skew(x.R.inverse() * (x.pc[side] - x.p));
+    off.block<3, 3>(pc, 3).diagonal().setConstant(moved);
+  }
+  P += off * off.transpose();
   out.replay_.forget_estimates();
   return out;
 }

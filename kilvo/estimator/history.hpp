@@ -35,11 +35,10 @@ class History {
   /// For a sweep until `end`: a history that does not trust the accelerometer since the base, nor the gyro if the robot is to have turned
   /// at `rate`, rad/s, instead. None when that is too long ago. now() and closed() stay.
   std::optional<History> doubted(Time end, const std::optional<Eigen::Vector3d>& rate) const;
-  /// A history in which the pose at the base may be off by so much, rad and m, and nothing else. now() and closed() stay.
-  History moved(double turned, double moved) const;
+  /// A history in which the robot is elsewhere at the base, with its feet, up to standard deviations in rad and m. now() and closed() stay.
+  History moved(const SE3& by, double turned, double moved) const;
   /// A history in which the pose that is predicted from the last sweep to `middle` may be off by so much, rad and m, and the rates since
-  /// then with it; if `biases` are doubted, those of the IMU may have become others. None when that sweep is more than 1.5 s ago. now() and
-  /// closed() stay.
+  /// then with it; if `biases` are doubted, those of the IMU too. None when that sweep is over 1.5 s ago. now() and closed() stay.
   std::optional<History> loosened(Time middle, double turned, double moved, bool biases) const;
   /// The estimate at `until` if it was `e` before. The poses in between are in the trajectory.
   Estimate record_from(const Estimate& e, Time until);

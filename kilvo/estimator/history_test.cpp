@@ -139,6 +139,29 @@ TEST(History, ACorrectionIsNoMotionOfTheTrajectory) {
   EXPECT_NEAR((slower.p - (early.inverse() * late).p).norm(), 0.07, 0.02);
 }
 
+// It sees itself and its feet as before, and goes on as it did.
+TEST(History, ARobotThatIsElsewhereTakesItsVelocityAndItsFeetAlong) {
+  Estimate before = first_estimate();
+  before.x.pc[0] = before.x.pose() * Eigen::Vector3d(0.1, 0.2, -0.8);
+  before.P.block<3, 3>(at::pcl, at::pcl).diagonal().setConstant(1e-6);
+  History history{EstimatorConfig{}};
+  history.begin(before, std::nullopt);
+  const SE3 by{SO3::Exp({0, 0, 1.6}), {1.9, -0.4, 0.02}};
+  constexpr double turned = 0.02, moved = 0.05;
+  const Estimate after = history.moved(by, turned, moved).base();
+  EXPECT_LT(distance(after.x.pose(), by * before.x.pose()), 1e-12);
+  EXPECT_LT((after.x.R.inverse() * after.x.v - before.x.R.inverse() * before.x.v).norm(), 1e-12);
+  EXPECT_LT((after.x.pose().inverse() * after.x.pc[0] - before.x.pose().inverse() * before.x.pc[0]).norm(), 1e-12);
+  EXPECT_EQ(after.x.pc[1], before.x.pc[1]) << "does not stand";
+  EXPECT_EQ(after.x.g, before.x.g);
+  EXPECT_NEAR(after.P(at::R, at::R), before.P(at::R, at::R) + turned * turned, 1e-12);
+  const Eigen::Matrix3d between = after.P.block<3, 3>(at::p, at::p) + after.P.block<3, 3>(at::pcl, at::pcl) -
+                                  after.P.block<3, 3>(at::p, at::pcl) - after.P.block<3, 3>(at::pcl, at::p);
+  EXPECT_LT(std::sqrt(between.trace()), 0.02 + turned * std::sqrt(2.0)) << "the shift is the same for both, but for the turn";
+  EXPECT_GT(after.P(at::pcl, at::pcl), moved * moved);
+  EXPECT_TRUE((after.P.block<3, 3>(at::pcr, at::pcr).isZero(0)));
+}
+
 // Images between two sweeps are the base soon before the second one: what the sweep shows came with rates of 100 ms, not of 10.
 TEST(History, APredictionThatIsDoubtedMayHaveBeenOffSinceTheSweepBeforeNotSinceTheImageBetween) {
   History history{EstimatorConfig{}};

@@ -24,8 +24,7 @@ class MovingStart {
   bool add(const LidarScan& scan, History& history, PointDrops& drops);
   /// Another sensor measures the velocity from now on: the result of the sweeps is not kept.
   void give_up(History& history, Time now);
-  /// The velocity is known, or has not been found for long: gravity and biases are the guesses of the start again, since parts of sweeps
-  /// measure them too little.
+  /// The velocity is known, or was not found for long: gravity and biases, which parts of sweeps hardly measure, are guesses again.
   bool is_over() const { return is_over_; }
   /// What the covariance of a pose there lacks: it is relative to where the parts' map began, or the robot when it was over.
   PoseCovariance error_at(const SE3& T_WI) const { return map_.error_at(T_WI); }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "kilvo/lidar/relocate.hpp"
@@ -12,12 +13,10 @@ namespace {
 double met(const RegistrationReport& report) { return report.matched + report.rejected; }
 double share_beside(const RegistrationReport& report) { return met(report) > 0 ? report.rejected / met(report) : 0; }
 
-// By so much of what the nearest planes bear.
-Estimate inflated(const Estimate& prior, double part) {
-  Estimate out = prior;
-  out.P.diagonal().segment<3>(at::R).array() += std::pow(part * well_known_rotation, 2);
-  out.P.diagonal().segment<3>(at::p).array() += std::pow(part * well_known_position, 2);
-  return out;
+Estimate inflated(Estimate prior, double rotation, double position) {
+  prior.P.diagonal().segment<3>(at::R).array() += rotation * rotation;
+  prior.P.diagonal().segment<3>(at::p).array() += position * position;
+  return prior;
 }
 
 bool measures(const Registration& sweep) { return !sweep.refused && sweep.carries && met(sweep.report) > 0; }
@@ -56,9 +55,13 @@ PredictionCheck::Surprise PredictionCheck::surprise(const Estimate& prior, const
   return surprised_ ? Surprise::first : Surprise::none;
 }
 
-Estimate PredictionCheck::released(const Estimate& prior) { return inflated(prior, 0.7); }
+Estimate PredictionCheck::released(const Estimate& prior) { return inflated(prior, 0.7 * well_known_rotation, 0.7 * well_known_position); }
 
-Estimate PredictionCheck::lost(const Estimate& prior) { return inflated(prior, 3); }
+Estimate PredictionCheck::lost(const Estimate& prior) const {
+  // A search goes to three standard deviations: all round, and to 2 m.
+  if (contradicted_sweeps_ + 1 >= enough - 1) return inflated(prior, std::numbers::pi / 3, 2.0 / 3);
+  return inflated(prior, 3 * well_known_rotation, 3 * well_known_position);
+}
 
 bool PredictionCheck::explains(const Registration& again, const Registration& sweep) const {
   if (again.refused || !again.carries || again.report.matched <= sweep.report.matched || lies_beside(again.report)) return false;
@@ -74,6 +77,8 @@ bool PredictionCheck::is_small(const Error& off) {
   constexpr double small = 0.3;  // of what the nearest planes bear
   return off.turned < small * well_known_rotation && off.moved < small * well_known_position;
 }
+
+bool PredictionCheck::is_far(const Error& off) { return off.turned > 9 * well_known_rotation || off.moved > 9 * well_known_position; }
 
 void PredictionCheck::begin(Time t, const Error& off) {
   if (!error_) {

@@ -26,8 +26,10 @@ class PredictionCheck {
   bool is_to_be_searched_for() const { return std::has_single_bit(contradicted_sweeps_ + 1); }
   /// The prior from which the sweep is to be registered again: uncertain as far as the nearest planes are the right ones.
   static Estimate released(const Estimate& prior);
-  /// Uncertain beyond that: the sweep is searched for.
-  static Estimate lost(const Estimate& prior);
+  /// Uncertain beyond that: the sweep is searched for. After some that nothing explained the robot may have been moved to anywhere near.
+  Estimate lost(const Estimate& prior) const;
+  /// So many sweeps in a row were not explained.
+  bool lies_beside_for_long() const { return contradicted_sweeps_ == 2 * enough; }
   /// `again`, the same sweep from another prior, lies on the surfaces as sweeps usually do.
   bool explains(const Registration& again, const Registration& sweep) const;
 
@@ -38,6 +40,8 @@ class PredictionCheck {
   static Error error_between(const State& predicted, const State& found);
   /// That of a prediction that may be right.
   static bool is_small(const Error& off);
+  /// Farther than a prediction is ever off: the robot was moved.
+  static bool is_far(const Error& off);
   /// The prediction at `t` was off by this: those that follow may be as well.
   void begin(Time t, const Error& off);
   /// Of the predictions now, as the last sweeps show it; none while they are right.

@@ -1,5 +1,6 @@
 #include "kilvo/estimator/prediction_check.hpp"
 
+#include <cmath>
 #include <gtest/gtest.h>
 #include <initializer_list>
 #include <vector>
@@ -202,6 +203,39 @@ TEST(PredictionCheck, WhatNoPoseNearByExplainsIsSearchedForLessAndLessOften) {
     c.learn(sweep(1900));
   }
   EXPECT_EQ(searched, (std::vector{1, 2, 4, 8, 16}));
+}
+
+TEST(PredictionCheck, ARobotThatIsNotFoundNearByMayBeFartherAwayAndTurned) {
+  Checked c = after(30, 100);
+  const Estimate prior;
+  std::vector<double> heading, place;
+  for (int k = 1; k <= 4; ++k) {
+    heading.push_back(std::sqrt(c.check.lost(prior).P(at::R + 2, at::R + 2)));
+    place.push_back(std::sqrt(c.check.lost(prior).P(at::p, at::p)));
+    c.learn(sweep(1900));
+  }
+  for (const std::size_t k : {0, 1, 2}) {
+    EXPECT_NEAR(heading[k], 0.09, 1e-9);
+    EXPECT_NEAR(place[k], 0.24, 1e-9);
+  }
+  EXPECT_NEAR(3 * heading[3], M_PI, 1e-9);
+  EXPECT_NEAR(3 * place[3], 2, 1e-9);
+  EXPECT_TRUE(PredictionCheck::is_far({0.02, 1.9}));
+  EXPECT_TRUE(PredictionCheck::is_far({1.5, 0.01}));
+  EXPECT_FALSE(PredictionCheck::is_far({0.2, 0.5}));
+}
+
+TEST(PredictionCheck, WhatLiesBesideTheMapForLongIsToldOnceInARow) {
+  Checked c = after(30, 100);
+  for (int k = 1; k <= 14; ++k) {
+    c.learn(sweep(1500));
+    EXPECT_EQ(c.check.lies_beside_for_long(), k == 10) << k;
+  }
+  Checked crowd = after(30, 100);
+  for (int k = 0; k < 100; ++k) {
+    crowd.learn(sweep(k % 8 == 0 ? 100 : 800));
+    EXPECT_FALSE(crowd.check.lies_beside_for_long()) << "now and then it agrees";
+  }
 }
 
 }  // namespace prediction_check_test

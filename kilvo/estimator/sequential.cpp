@@ -34,6 +34,9 @@ void judge(const PredictionCheck& check, const State& expected, const Registrati
   if (sweep.unpredicted && !PredictionCheck::is_small(off))
     findings.report(now, Sensor::lidar, Reason::not_where_predicted, off.moved,
                     decimals(off.moved, 2) + " m and " + decimals(off.turned * 180 / std::numbers::pi, 1) + " degrees");
+  if (check.lies_beside_for_long() && (sweep.carries || sweep.refused == Reason::fits_nowhere))
+    findings.contradict(Reason::inconsistent, Sensor::lidar, Findings::witness_against(Sensor::lidar, now), off.moved,
+                        "sweeps lie beside the map, at the predicted pose and near by: the robot, or much around it, was moved", now);
   if (!check.lasts() && (!check.is_hopeless() || findings.statistics().diverged)) return;
   findings.contradict(check.is_hopeless() ? Reason::diverged : Reason::inconsistent, Sensor::imu, Sensor::lidar,
                       check.error().value_or(PredictionCheck::Error{}).moved,

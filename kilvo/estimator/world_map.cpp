@@ -100,16 +100,21 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
   std::optional<Attempt> best, moved;
   if (!out.searched && (!out.refused || searches)) {
     Registration near = measure_near(lidar, sweep, history, prior, PredictionCheck::released(prior));
-    if (searches && !explains(near)) near = measure_near(lidar, sweep, history, prior, PredictionCheck::lost(prior));
+    if (searches && !explains(near)) near = measure_near(lidar, sweep, history, prior, prediction_.lost(prior));
     const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
-    if (explains(near)) best = try_with(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs()));
-    if (is_contradicted && explains(near) && !agrees(prior, out) && !PredictionCheck::is_small(off))
-      moved = try_with(history.moved(off.turned, off.moved));
+    const bool is_far = PredictionCheck::is_far(off);
+    if (explains(near) && !is_far) best = try_with(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs()));
+    if (is_contradicted && explains(near) && (is_far || (!agrees(prior, out) && !PredictionCheck::is_small(off))))
+      moved =
+          try_with(history.moved(near.posterior.x.pose() * prior.x.pose().inverse(), 0.7 * well_known_rotation, 0.7 * well_known_position));
+    // No push changes the velocity by 3 m/s between two sweeps; where that comes again it was none that moved the robot.
+    const bool is_pushed = was_moved_ || off.moved < 3 * to_seconds(prior.t - history.base().t);
     constexpr double clearly = 1.03;  // times as many
-    if (moved && best && on_surfaces(*moved) < clearly * on_surfaces(*best)) moved.reset();
+    if (moved && best && is_pushed && on_surfaces(*moved) < clearly * on_surfaces(*best)) moved.reset();
     if (best && !moved) return prediction_.begin(prior.t, off), best;
   }
   // Samples are wrong only where no other pose explains the sweep, and where it is somewhere else without them.
+  was_moved_ = moved.has_value();
   best = std::move(moved);
   const Replay& samples = history.replay();
   for (const auto& rate : {std::optional<Eigen::Vector3d>(), samples.gyro_at(history.base().t), std::optional(samples.mean_gyro())}) {
@@ -157,6 +162,7 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, 
     out.posterior = prior;
   }
   if (!is_contradicted && out.carries) {
+    was_moved_ = false;
     const Motion motion = motion_between(history.base().x, predicted.x);
     usual_motion_.turned2 += (motion.turned2 - usual_motion_.turned2) / PredictionCheck::remembered;
     usual_motion_.pushed2 += (motion.pushed2 - usual_motion_.pushed2) / PredictionCheck::remembered;

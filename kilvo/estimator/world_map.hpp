@@ -35,8 +35,7 @@ class WorldMap {
   Registration register_sweep(LidarPipeline& lidar, const Sweep& sweep, History& history, Estimate& prior, PointDrops& drops);
   /// Whether the IMU predicts what sweeps find.
   const PredictionCheck& prediction() const { return prediction_; }
-  /// A sweep fitted nowhere. True when that has lasted: the robot is taken to be outside of the map, and it restarts around `prior`,
-  /// unless it was given.
+  /// A sweep fitted nowhere. True when that has lasted: the robot is outside of the map, which restarts around `prior` unless it was given.
   bool refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time end);
 
   /// A sweep was registered, and its posterior is used. `may_grow`: what it saw becomes part of the map, with how uncertain the pose was.
@@ -76,8 +75,7 @@ class WorldMap {
   /// It fits nowhere, or is not where it was predicted: in a crowd it would be.
   bool is_lost(const Estimate& prior, const Registration& sweep) const;
   bool agrees(const Estimate& prior, const Registration& sweep) const;
-  /// From where it is found from `released`, with the gate of the prior: that of an uncertain one lets almost everything lie on the
-  /// surfaces.
+  /// From where it is found from `released`, with the gate of the prior: in that of an uncertain one almost all lies on the surfaces.
   Registration measure_near(LidarPipeline& lidar, const Sweep& sweep, const History& history, Estimate prior,
                             const Estimate& released) const;
 
@@ -89,6 +87,7 @@ class WorldMap {
   PredictionCheck prediction_;
   Motion usual_motion_;  // between sweeps, as the IMU predicts it: means of the last seconds
   bool is_given_ = false;
+  bool was_moved_ = false;  // the robot, before a sweep that contradicted the prediction; none since agreed with it
 };
 
 }  // namespace kilvo

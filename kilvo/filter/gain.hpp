@@ -12,8 +12,7 @@
 
 namespace kilvo {
 
-/// W = P H' and the lower triangle of S += H W; of H (`rows` by at::size, row-major, fewer than at::size) zeros cost nothing. W and S are
-/// column-major.
+/// W = P H' and the lower triangle of S += H W, column-major; of H (`rows` by at::size, row-major, fewer than at::size) zeros cost nothing.
 void project_rows(const Covariance& P, const double* H, int rows, double* S, double* W);
 
 /// How many rows a model may return.

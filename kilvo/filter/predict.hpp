@@ -26,8 +26,7 @@ struct ImuInterval {
   static ImuInterval between(const ImuSample& a, const ImuSample& b, Time begin, Time end);
 };
 
-/// Densities of the process noise: what is added to the covariance is the square times dt, so that one setting means one filter at
-/// any rate.
+/// Densities of the process noise: the covariance gets the square times dt, so that one setting means one filter at any rate.
 struct ProcessNoise {
   double gyro = 4e-4;            // rad/s/sqrt(Hz)
   double accel = 0.003;          // m/s^2/sqrt(Hz)

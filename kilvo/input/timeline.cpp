@@ -69,8 +69,7 @@ bool Timeline::is_awaited(Sensor sensor, Time key) const {
 }
 
 bool Timeline::may_go(Time key) const {
-  // The IMU, which everything needs, is the clock: one sensor that is ahead of it must not make all others late. If it is silent, so much
-  // may gather and no more.
+  // The IMU is the clock: one sensor that is ahead of it must not make all others late. If it is silent, so much may gather.
   constexpr std::size_t most = 5000;
   const auto& imu = newest(Sensor::imu);
   const bool waited = expected_[index_of(Sensor::imu)] ? imu && *imu - key >= max_wait_ : *newest_of_all_ - key >= max_wait_;

@@ -37,8 +37,7 @@ struct LegConfig {
         Field{"position_correlation", &LegConfig::position_correlation, "s", "correlation time of that"},
         Field{"ground_sigma", &LegConfig::ground_sigma, "m",
               "standard deviation of a foot's height over the map's ground at touchdown, without LiDAR"},
-        Field{"entry_delay", &LegConfig::entry_delay, "s",
-              "a foot is used this long after the last sample that did not show its touchdown"},
+        Field{"entry_delay", &LegConfig::entry_delay, "s", "a foot is used so long after the last sample that did not show its touchdown"},
         Field{"gate", &LegConfig::gate, "sigma", "a stance foot that moves more than this has a smaller weight"},
         Field{"iterations", &LegConfig::iterations, "-", "iterations of one update by the legs at most"},
         Field{

@@ -53,12 +53,10 @@ class LegKinematics {
   ~LegKinematics();
 
   /// The feet, or why they cannot be known: "not finite", "joint NAME is missing", ... Joints are matched by name, in any order; a message
-  /// without velocities gets the difference to the message before, so the first of them only begins it. Allocates only when the names in
-  /// the message change.
+  /// without velocities gets the difference to the one before, so the first only begins it. Allocates only when the names change.
   std::variant<Feet, std::string> feet(const JointSample& sample);
 
-  /// What makes messages like this one useless for this robot, if anything: a joint that is neither in them nor locked, joints where two
-  /// feet are expected.
+  /// What makes such messages useless for this robot, if anything: a joint neither in them nor locked, joints where two feet are expected.
   std::optional<std::string> mismatch(const JointSample& sample) const;
 
  private:

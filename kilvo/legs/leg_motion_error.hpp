@@ -18,8 +18,7 @@ class LegMotionError {
  public:
   LegMotionError();
 
-  /// M, in the IMU frame, as it is to be corrected: as far as it is significant. Its vertical part is never learnt: how soles sink and roll
-  /// depends on the ground.
+  /// M, in the IMU frame, as far as it is significant. Its vertical part is never learnt: how soles sink and roll depends on the ground.
   const Eigen::Matrix3d& matrix() const { return corrected_; }
 
   /// Something else has measured the pose, but for the position along `unknown` (takes an error of the position to its part there).

@@ -1,6 +1,5 @@
 // The paper's contact estimation (Section V), as it is printed: deviations from the robot's own statistics of its first swing, with the
-// same two numbers (theta_d, N_d) for every robot and gait. Selected by legs.contact: paper. docs/decisions/paper.md: what the text leaves
-// open and how it is read here.
+// same two numbers (theta_d, N_d) for every robot and gait. For legs.contact: paper. What the text leaves open: docs/decisions/paper.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -32,8 +31,7 @@ class PaperContactEstimator {
   /// Velocity, position and height of a supporting foot: the rows of r_c (Eq. 7).
   using Residual = Eigen::Matrix<double, 7, 1>;
 
-  /// `x`: the state at feet.t. `omega`, `accel`: bias-free rate (rad/s) and specific force (m/s^2) of the IMU. `map`: where the ground is
-  /// looked up, if there is one.
+  /// `x`: the state at feet.t. `omega`, `accel`: bias-free rate (rad/s), specific force (m/s^2) of the IMU. `map`: of the ground, if any.
   const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel,
                          const VoxelMap* map = nullptr);
   const Contacts& contacts() const { return contacts_; }

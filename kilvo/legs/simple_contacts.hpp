@@ -39,8 +39,7 @@ class ForceContacts : public ContactReport {
 };
 
 /// As HR2-KILO is described: when the acceleration's variance within a short window rises, a foot has come down; it is the one that was
-/// higher over the ground within the last swing, and the other one leaves. Lift-offs are not seen by themselves, and until the first
-/// impact both stand.
+/// higher over the ground within the last swing, and the other one leaves. Lift-offs are not seen; until the first impact both stand.
 class VarianceContacts : public ContactReport {
  public:
   const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& accel);

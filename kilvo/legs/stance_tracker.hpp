@@ -34,8 +34,7 @@ class StanceTracker {
 
   /// Both feet leave the filter at the next step, to enter anew.
   void restart();
-  /// Which feet's rows were within their gates of the last step. A foot that is beyond for a while has slipped: it enters anew, where it
-  /// then is.
+  /// Which feet's rows were within their gates of the last step. A foot that is beyond for a while has slipped: it enters anew.
   void judge(const LegStep& step, const std::array<bool, 2>& passed);
 
  private:

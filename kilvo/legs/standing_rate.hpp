@@ -22,8 +22,7 @@ struct GyroBiasReading {
 /// and what the angle deviates from that line gives its sigma.
 class StandingRate {
  public:
-  /// One leg sample; `gyro` as measured, rad/s. A reading whenever the information of the standing phase has grown enough; each has only
-  /// the new part.
+  /// One leg sample; `gyro` as measured, rad/s. A reading of what is new, whenever the information of the standing phase has grown enough.
   std::optional<GyroBiasReading> add(const Feet& feet, const Contacts& contacts, const Eigen::Vector3d& gyro);
 
  private:

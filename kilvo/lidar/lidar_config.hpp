@@ -23,8 +23,7 @@ struct LidarConfig {
 
   static constexpr auto fields() {
     return std::tuple{
-        Field{"range_noise", &LidarConfig::range_noise, "m",
-              "standard deviation of one measured range; surfaces that look thicker raise it"},
+        Field{"range_noise", &LidarConfig::range_noise, "m", "standard deviation of a measured range; surfaces that look thicker raise it"},
         Field{"angle_noise", &LidarConfig::angle_noise, "rad", "standard deviation of one beam's direction, each way"},
         Field{"voxel_size", &LidarConfig::voxel_size, "m",
               "points of a sweep in one cell of this size become one row that weighs as much as they do; at most a quarter "

@@ -11,8 +11,7 @@ namespace {
 // A cluster thicker than its noise explains lies on two surfaces: its mean lies on neither.
 constexpr double thickness_sigmas2 = 6.0;
 
-// By how much such weights make the variance of a Gaussian's mean larger than the inverse of their sum (Huber 1964: E[psi^2] E[w] /
-// E[psi']^2).
+// By how much such weights make the variance of a Gaussian's mean exceed the inverse of their sum (Huber 1964: E[psi^2] E[w] / E[psi']^2).
 constexpr double robust_cost = 1.0094;
 
 // The thickness test needs a few points to say anything.

@@ -21,14 +21,12 @@ struct PointDrops {
   std::uint32_t non_finite = 0, at_origin = 0, too_near = 0, too_far = 0, own_body = 0, outside_trajectory = 0;
 };
 
-/// A scan's points in the IMU frame of time `at`, by their relative motion along `trajectory`; both ends of the scan and `at` should
-/// lie within it. Points without a pose (up to `slack` outside is taken as the end pose) and of the robot's own `body` are dropped and
-/// counted.
+/// A scan's points in the IMU frame of time `at`, by their relative motion along `trajectory`; both ends of the scan and `at` should lie
+/// within it. Points without a pose (up to `slack` outside: the end pose) and of the robot's own `body` are dropped and counted.
 std::vector<PointXYZI> undistort(const LidarScan& scan, const Trajectory& trajectory, Time at, const LidarMount& mount, PointDrops& drops,
                                  OwnBody* body = nullptr);
 
-/// What the IMU's noise within a scan, seen from its middle, does to the pose that its points tell. Of (rotation, position), common to all
-/// points.
+/// What the IMU's noise within a scan, seen from its middle, does to its pose (rotation, position), alike for all points.
 struct UndistortionNoise {
   PoseCovariance V = PoseCovariance::Zero();  // its covariance
   /// How it goes with the prediction over the first half of the scan, which the same noise has moved: opposite, so negative; and, by its

@@ -67,8 +67,7 @@ std::size_t VoxelMap::direction_cell(const Eigen::Vector3d& way) {
   return at(0) + direction_cells * (at(1) + direction_cells * at(2));
 }
 
-// From one root voxel to the next, and from leaf to leaf only within those that hold something other than a plane that the beam does not
-// pass through.
+// From one root voxel to the next, and from leaf to leaf only within those that hold more than a plane that the beam does not cross.
 void VoxelMap::trace(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const double length = (to - from).norm(), clear = leaf_size();
   if (!(length < config_.radius) || length < 2 * clear) return;

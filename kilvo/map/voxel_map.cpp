@@ -45,8 +45,7 @@ const Plane* VoxelMap::plane_at(const Eigen::Vector3d& x) const {
 }
 
 // Walks with up to `together` points from their root voxels down, all of them one step at a time, and asks for what the next step will
-// read. stop(i, index) ends the walk of point i at the node. Inlined by order: g++ 12 takes a function that only prefetches for one without
-// effect, and drops the call.
+// read. stop(i, index) ends the walk of point i at the node. Inlined by order: g++ 12 drops the call of a function that only prefetches.
 template <std::size_t first_line, class Stop>
 [[gnu::always_inline]] inline void VoxelMap::walk_in_step(std::span<const Leaf> leaves, Stop&& stop) const {
   std::array<std::uint32_t, together> at;

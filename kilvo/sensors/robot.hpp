@@ -49,7 +49,7 @@ struct LegsMount {
   static constexpr auto fields() {
     return std::tuple{
         Field{"type", &LegsMount::type, "-",
-              "what the leg message holds: joints (sensor_msgs/JointState by name) or feet (two foot positions)"},
+              "what the messages hold: joints (sensor_msgs/JointState by name) or feet (two foot positions)"},
         Field{"velocities", &LegsMount::velocities, "-", "of the joints: those in the messages, or the change of the positions"},
         Field{"rate", &LegsMount::rate, "Hz", "nominal rate of the leg messages"},
         Field{"time_offset", &LegsMount::time_offset, "s", "added to the stamps of the leg messages"},

@@ -34,8 +34,7 @@ struct Placing {
   float centre[2], step_x[2], step_y[2], c[2];
 };
 
-// Bilinear, of each pixel. The places first, then their four neighbours, then what is between them: only the second step is not done
-// for many at once.
+// Bilinear, of each pixel. The places first, then their four neighbours (not for many at once), then what is between them.
 KILVO_WIDE void sample_all(const std::uint8_t* pixels, const Placing& placing, Wide& out) {
   constexpr float reach = half + 1;
   alignas(32) std::array<float, wide_count> a, b;

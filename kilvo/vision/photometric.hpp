@@ -1,7 +1,6 @@
 // The visual measurement (paper, Eq. 12): patches of the visual map against the image, directly by their grey values, with the inverse
 // exposure time as a state. The pixels of one patch are summed into a measurement of its position in the image and of the exposure; only
-// then does the pose enter, so that what is uncertain about a patch as a whole (depth, calibration) is noise of the patch, not of each
-// pixel.
+// then does the pose enter, so that what is uncertain about a patch as a whole (depth, calibration) is noise of the patch, not of pixels.
 #pragma once
 
 #include <Eigen/Core>

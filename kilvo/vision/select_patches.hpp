@@ -53,8 +53,7 @@ inline constexpr double alike_scale = 0.4, alike_angle = 0.25;
 std::vector<PatchCandidate> select_patches(const VisualMap& map, const Camera& camera, const SE3& T_CW, const DepthView& depth,
                                            const VisionConfig& config);
 
-/// How the plane through p_W with normal n_W maps from the image at T_CW to that at T_RW, about the point. None where either does not see
-/// it.
+/// How the plane through p_W with normal n_W maps from the image at T_CW to that at T_RW, about the point. None where one does not see it.
 std::optional<PlaneWarp> warp_between(const Camera& camera, const SE3& T_CW, const SE3& T_RW, const Eigen::Vector3d& p_W,
                                       const Eigen::Vector3d& n_W);
 

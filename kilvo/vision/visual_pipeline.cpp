@@ -34,8 +34,7 @@ bool is_new_view(const PatchCandidate& track) {
 }
 
 // The visual correction of the pose is applied to new patches only along directions that the LiDAR does not measure. Elsewhere patches are
-// kept where the LiDAR's map has them: else two maps would come to be, each true to itself, whose rays and planes no longer meet where the
-// surface is.
+// kept where the LiDAR's map has them: else two maps would come to be, each true to itself, whose rays and planes no longer meet.
 SE3 as_the_map_has_it(const State& before, const State& after, const PoseCovariance& weak) {
   const Eigen::Matrix<double, 6, 1> change = weak * boxminus(after, before).head<6>();
   return {before.R * SO3::Exp(change.head<3>()), before.p + change.tail<3>()};

@@ -1,6 +1,5 @@
 // One image, from the message to the estimate at its time: which patches of the visual map it should show, how the pose and the exposure
-// must be for that, whether that is valid, and what is learnt from it. Owns the visual map; changes neither the LiDAR's map nor the
-// estimate.
+// must be for that, whether that is valid, and what is learnt from it. Owns the visual map; changes neither LiDAR map nor estimate.
 #pragma once
 
 #include <memory>

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <limits>
 #include <utility>
 
 namespace kilvo::lab {
@@ -32,16 +31,26 @@ bool has_place(const LidarPoint& p) { return p.x * p.x + p.y * p.y + p.z * p.z >
 
 }  // namespace
 
-// Both lists are walked once: a driver may put all rays without an echo at one place.
 std::size_t RepeatedPoints::take_out(LidarScan& scan) {
   now_.clear();
   const std::int64_t stamp = to_ns(scan.t), until = newest_;
-  std::int32_t last = std::numeric_limits<std::int32_t>::min();
   for (const LidarPoint& p : scan.points) {
-    last = std::max(last, p.offset_ns);
     if (is_compared(p) && has_place(p)) now_.push_back({place_of(p), stamp + p.offset_ns});
   }
+  const OffsetRange offsets = offsets_of(scan);
+  // What was measured later than all of the scan before is not in it.
+  const std::size_t repeated = stamp + offsets.first < until + same_time ? count_repeated() : 0;
+  if (!scan.points.empty()) newest_ = stamp + offsets.last;
+  std::swap(before_, now_);
+  if (repeated < fewest || repeated * most_by_chance_one_of < before_.size()) return 0;
+  scan.offsets.reset();
+  return std::erase_if(scan.points, [&](const LidarPoint& p) { return stamp + p.offset_ns <= until; });
+}
+
+// Both lists are walked once: a driver may put all rays without an echo at one place.
+std::size_t RepeatedPoints::count_repeated() {
   const auto order = [](const Seen& s) { return std::pair(s.place, s.t); };
+  std::ranges::sort(before_, {}, order);
   std::ranges::sort(now_, {}, order);
   std::size_t repeated = 0;
   auto other = before_.begin();
@@ -50,11 +59,7 @@ std::size_t RepeatedPoints::take_out(LidarScan& scan) {
     while (other != before_.end() && order(*other) < earliest) ++other;
     if (other != before_.end() && other->place == seen.place && other->t < seen.t + same_time) ++repeated;
   }
-  if (!scan.points.empty()) newest_ = stamp + last;
-  std::swap(before_, now_);
-  if (repeated < fewest || repeated * most_by_chance_one_of < before_.size()) return 0;
-  scan.offsets.reset();
-  return std::erase_if(scan.points, [&](const LidarPoint& p) { return stamp + p.offset_ns <= until; });
+  return repeated;
 }
 
 }  // namespace kilvo::lab

@@ -19,8 +19,9 @@ class RepeatedPoints {
     std::uint64_t place;  // of the bits of x, y, z
     std::int64_t t;       // ns
   };
+  std::size_t count_repeated();
 
-  std::vector<Seen> before_, now_;  // a share of the points, chosen by their place, sorted by it and by time
+  std::vector<Seen> before_, now_;  // a share of the points, chosen by their place
   std::int64_t newest_ = 0;         // ns, of the scan before
 };
 

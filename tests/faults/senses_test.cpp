@@ -27,13 +27,13 @@ bool has(const Outcome& o, Reason r) {
 }
 
 // The robot does not move for so many seconds from 5 s on, as far as any sense can tell.
-Outcome carried(const FailingWalk& walk, int seconds) {
+Outcome carried(const FailingWalk& walk, int seconds, const std::array<bool, sensor_count>& used = li) {
   const auto carry = [seconds](Measurement& m, double s) {
     if (s >= 5 && s < 5 + seconds) return false;
     if (s >= 5) std::visit([seconds](auto& x) { x.t -= std::chrono::seconds(seconds); }, m);
     return true;
   };
-  return walk.with({}, {li, carry, {}, [seconds](double s) { return s < 5 ? s : s + seconds; }});
+  return walk.with({}, {used, carry, {}, [seconds](double s) { return s < 5 ? s : s + seconds; }});
 }
 
 class Senses : public testing::Test {
@@ -174,6 +174,21 @@ TEST_F(Senses, ARobotThatWasCarriedAMetreOrTwoIsFound) {
   EXPECT_LT(o.worst(&Moment::sigmas, 6, 20), 4.0);
   EXPECT_TRUE(has(o, Reason::not_where_predicted));
   EXPECT_EQ(o.statistics.maps_begun_anew, 0u);
+}
+
+// Farther away and turned, and on its feet again at once: they stand where it is now.
+TEST_F(Senses, ARobotThatWasCarriedAndTurnedIsFoundWithItsFeet) {
+  const FailingWalk walk("room", 1, 18);
+  for (const auto& used : {kil, li}) {
+    for (const int seconds : {3, 5}) {
+      const Outcome o = carried(walk, seconds, used);
+      std::printf("carried for %d s, legs %d: error %.3f m once it is found\n", seconds, used[1], o.worst(&Moment::error, 6, 20));
+      EXPECT_LT(o.worst(&Moment::error, 6, 20), 0.02);
+      EXPECT_LT(o.worst(&Moment::sigmas, 6, 20), 4.0);
+      EXPECT_TRUE(has(o, Reason::not_where_predicted));
+      EXPECT_EQ(o.statistics.maps_begun_anew, 0u);
+    }
+  }
 }
 
 // Until the next sweep nothing tells; then that sweep, and what the samples were before.
