@@ -104,9 +104,10 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
     const auto off = PredictionCheck::error_between(prior.x, near.posterior.x);
     const bool is_far = PredictionCheck::is_far(off);
     if (explains(near) && !is_far) best = try_with(history.loosened(prior.t, off.turned, off.moved, prediction_.recurs()));
+    const SE3 by = is_far ? near.posterior.x.pose() * prior.x.pose().inverse() : SE3{};
+    const auto within = is_far ? PredictionCheck::Error{0.7 * well_known_rotation, 0.7 * well_known_position} : off;
     if (is_contradicted && explains(near) && (is_far || (!agrees(prior, out) && !PredictionCheck::is_small(off))))
-      moved =
-          try_with(history.moved(near.posterior.x.pose() * prior.x.pose().inverse(), 0.7 * well_known_rotation, 0.7 * well_known_position));
+      moved = try_with(history.moved(by, within.turned, within.moved));
     // No push changes the velocity by 3 m/s between two sweeps; where that comes again it was none that moved the robot.
     const bool is_pushed = was_moved_ || off.moved < 3 * to_seconds(prior.t - history.base().t);
     constexpr double clearly = 1.03;  // times as many
