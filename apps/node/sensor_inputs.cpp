@@ -98,7 +98,7 @@ bool SensorInputs::give_time(Input& input, Measurement& measurement, Time arrive
 bool SensorInputs::bring_onto_imu_clock(Input& input, Measurement& measurement, Time arrived) {
   const Sensor sensor = sensor_of(measurement);
   std::optional<Duration> by;
-  std::string finding, drift;
+  std::string finding, drift, step;
   bool known = false;
   {
     const std::lock_guard lock(clocks_mutex_);
@@ -108,6 +108,7 @@ bool SensorInputs::bring_onto_imu_clock(Input& input, Measurement& measurement, 
     by = clocks_.offset(sensor);
     if (by && !input.moved) finding = clocks_.finding(sensor);
     if (!input.drifts) drift = clocks_.drift_finding(sensor);
+    if (sensor == Sensor::legs && std::exchange(input.clock_steps, clocks_.steps()) != clocks_.steps()) step = clocks_.step_finding();
   }
   {
     const std::lock_guard lock(input.mutex);
@@ -115,6 +116,7 @@ bool SensorInputs::bring_onto_imu_clock(Input& input, Measurement& measurement, 
     if (by) input.moved = to_seconds(*by);
   }
   if (!finding.empty()) say_(finding);
+  if (!step.empty()) say_(step);
   if (!drift.empty()) {
     input.drifts = true;
     say_(drift);

@@ -81,6 +81,7 @@ class SensorInputs {
     lab::SensorIntake intake;
     int findings = 0;            // of the intake, that the user was told
     bool drifts = false;         // so was that its clock does
+    int clock_steps = 0;         // of its clock: that were reported
     std::string fault;           // of the newest message
     std::set<std::string> said;  // kinds of faults that the user was told, without their numbers
     std::string connection;

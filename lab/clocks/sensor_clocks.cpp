@@ -63,6 +63,8 @@ void SensorClocks::note(const Measurement& m, Time arrived) {
   Stream& stream = streams_[index_of(sensor)];
   if (std::abs(to_seconds(arrived.time_since_epoch()) - to_seconds(stamp_of(m).time_since_epoch())) > absurd) return;
   follow_drift(stream, arrived, arrived - stamp_of(m));
+  if (sensor == Sensor::legs) leg_steps_.note(stamp_of(m), arrived);
+  if (sensor == Sensor::imu) leg_steps_.note_imu(arrived - stamp_of(m));
   if (is_given_up_ || stream.is_judged) return;
   stream.add(arrived, arrived - completion_of(m));
   for (const Sensor other : all_sensors) {
@@ -109,6 +111,7 @@ void SensorClocks::judge(Sensor s, Time arrived) {
 void SensorClocks::correct(Measurement& m) const {
   const Stream& stream = streams_[index_of(sensor_of(m))];
   std::visit([&stream](auto& x) { x.t += stream.offset.value_or(Duration(0)) + stream.drift.correction(); }, m);
+  if (auto* legs = std::get_if<JointSample>(&m)) legs->t += leg_steps_.correction();
 }
 
 std::string SensorClocks::finding(Sensor s) const {
@@ -118,6 +121,14 @@ std::string SensorClocks::finding(Sensor s) const {
   return name + ": its stamps are of another clock than the IMU's: by the times of arrival they lie " + std::to_string(std::abs(by)) +
          " s " + (by > 0 ? "before" : "after") + " the IMU's, and are moved by that. Synchronise the clocks; for these data " + name +
          ".time_offset: " + std::to_string(time_offsets_[index_of(s)] + by) + " does the same";
+}
+
+std::string SensorClocks::step_finding() const {
+  if (leg_steps_.count() == 0) return {};
+  const double by = 1e3 * to_seconds(leg_steps_.correction());
+  return "legs: their clock was set while they sent, " + std::to_string(leg_steps_.count()) +
+         (leg_steps_.count() == 1 ? " time" : " times") + ": by the times of arrival their stamps are moved by " + std::to_string(by) +
+         " ms from then on. Synchronise the clocks before";
 }
 
 std::string SensorClocks::drift_finding(Sensor s) const {

@@ -5,7 +5,8 @@
 // but for what each needs on its way. Where a sensor differs from the IMU by more than any way can take, its clock is another one, and
 // its stamps are moved by one constant onto the IMU's: so that its least delay is the IMU's. What jitters in the arrival does not enter. Of
 // several sensors with one such clock the one with the shortest way tells for all. Clocks that are not disciplined drift apart; that is
-// followed (ClockDrift).
+// followed (ClockDrift). A clock of the legs that is set while the robot walks is followed as well (StampSteps); those of LiDAR and camera
+// the estimator finds by their motion.
 #pragma once
 
 #include <algorithm>
@@ -16,6 +17,7 @@
 
 #include "kilvo/sensors/measurement.hpp"
 #include "lab/clocks/clock_drift.hpp"
+#include "lab/clocks/stamp_steps.hpp"
 
 namespace kilvo::lab {
 
@@ -46,6 +48,9 @@ class SensorClocks {
   std::string finding(Sensor s) const;
   /// The same of a clock that drifts against the IMU's. Empty where none is known to.
   std::string drift_finding(Sensor s) const;
+  /// The same of the legs' clock, which was set so many times: empty where it was not.
+  int steps() const { return leg_steps_.count(); }
+  std::string step_finding() const;
 
  private:
   struct Delay {
@@ -70,6 +75,7 @@ class SensorClocks {
   std::array<Stream, sensor_count> streams_;
   bool is_given_up_ = false;
   std::optional<Time> stretch_;  // when it began
+  StampSteps leg_steps_;
 };
 
 }  // namespace kilvo::lab

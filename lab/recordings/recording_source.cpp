@@ -155,6 +155,7 @@ std::vector<std::string> RecordingSource::warnings() const {
       if (!text.empty()) texts.push_back(text);
     }
   }
+  if (const std::string text = clocks_.step_finding(); !text.empty()) texts.push_back(text);
   if (options_.leg_clock) {
     const auto& clock = *options_.leg_clock;
     const auto text = clock.offset() ? std::to_string(1e3 * *clock.offset()) + " ms to the times of arrival" : std::string("not found");
