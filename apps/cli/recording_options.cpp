@@ -10,6 +10,7 @@ lab::RecordingOptions recording_options(const lab::Settings& settings, const std
   for (const Sensor sensor : used) out[sensor] = {true, settings.topic(sensor), rates[index_of(sensor)], offsets[index_of(sensor)]};
   out[Sensor::imu].gyro_scale = settings.robot.imu.gyro_scale;
   if (out[Sensor::legs].use) out[Sensor::legs].joints = lab::leg_joints(settings.robot);
+  out[Sensor::legs].with_velocities = settings.robot.legs.velocities == "messages";
   if (out[Sensor::legs].use && settings.leg_clock.clock != "stamp") out.leg_clock.emplace(settings.leg_clock, settings.robot);
   out.no_deskew = !settings.clouds.deskew;
   return out;

@@ -32,7 +32,8 @@ SensorInputs::SensorInputs(const lab::Settings& settings, bool no_deskew, Sink s
   for (const Sensor sensor : all_sensors) {
     input_of(sensor).topic = settings.topic(sensor);
     input_of(sensor).intake = lab::SensorIntake(time_offsets_of(settings.robot)[index_of(sensor)], settings.robot.imu.gyro_scale, true,
-                                                sensor == Sensor::legs ? lab::leg_joints(settings.robot) : JointNames());
+                                                sensor == Sensor::legs ? lab::leg_joints(settings.robot) : JointNames(),
+                                                settings.robot.legs.velocities == "messages");
   }
 }
 

@@ -59,6 +59,7 @@ History History::moved(const SE3& by, double turned, double moved) const {
   Eigen::Matrix<double, at::size, 6> off = Eigen::Matrix<double, at::size, 6>::Zero();
   off.block<3, 3>(at::R, 0).diagonal().setConstant(turned);
   off.block<3, 3>(at::p, 3).diagonal().setConstant(moved);
+  off.block<3, 3>(at::v, 0) = -turned * x.R.matrix() * skew(x.R.inverse() * x.v);
   for (const std::size_t side : {0, 1}) {
     const int pc = at::pcl + 3 * static_cast<int>(side);
     if (P.block<3, 3>(pc, pc).isZero(0)) continue;  // it does not stand
@@ -68,6 +69,7 @@ History History::moved(const SE3& by, double turned, double moved) const {
   }
   P += off * off.transpose();
   out.replay_.forget_estimates();
+  out.correct_trajectory(out.base_, Eigen::Vector3d::Zero());
   return out;
 }
 

@@ -91,8 +91,7 @@ class History {
   /// For the live propagator: becomes what is needed to go on from the newest IMU sample of `other`. A fork has no base and no trajectory:
   /// only now(), closed(), add(), predict_to(), take(), settle_leg_update() and close_fork() are for it. Allocates only to grow.
   void fork_from(const History& other);
-  /// Of a fork: closes the intervals up to the newest IMU sample that is not after `until`, keeps what came later and forgets what came
-  /// before. `legs`: the newest leg update, if any.
+  /// Of a fork: closes the intervals up to the newest IMU sample not after `until`, forgets what came before. `legs`: the newest, if any.
   void close_fork(Time until, std::optional<Time> legs);
 
  private:

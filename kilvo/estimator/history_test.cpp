@@ -155,6 +155,12 @@ TEST(History, ARobotThatIsElsewhereTakesItsVelocityAndItsFeetAlong) {
   EXPECT_EQ(after.x.pc[1], before.x.pc[1]) << "does not stand";
   EXPECT_EQ(after.x.g, before.x.g);
   EXPECT_NEAR(after.P(at::R, at::R), before.P(at::R, at::R) + turned * turned, 1e-12);
+  play(history, 0, 100);
+  History other = history.moved(by, turned, moved);
+  const Time early = before.t, late = before.t + milliseconds(90);
+  other.record_from(other.base(), late);
+  const SE3 here = history.trajectory().at(early)->inverse() * *history.trajectory().at(late);
+  EXPECT_LT(distance(other.trajectory().at(early)->inverse() * *other.trajectory().at(late), here), 1e-9) << "no point sees it jump";
   const Eigen::Matrix3d between = after.P.block<3, 3>(at::p, at::p) + after.P.block<3, 3>(at::pcl, at::pcl) -
                                   after.P.block<3, 3>(at::p, at::pcl) - after.P.block<3, 3>(at::pcl, at::p);
   EXPECT_LT(std::sqrt(between.trace()), 0.02 + turned * std::sqrt(2.0)) << "the shift is the same for both, but for the turn";

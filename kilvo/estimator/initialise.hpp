@@ -74,7 +74,7 @@ class Starter {
   std::vector<Sensor> dropped_;
 };
 
-/// R_WI with z of the world along `up_I` and x along the horizontal part of the IMU's x axis (of y when x is within 10 degrees of up).
+/// R_WI with z of the world along `up_I`, x along the horizontal part of the IMU's x axis (of y where x is within 10 degrees of vertical).
 SO3 level(const Eigen::Vector3d& up_I);
 
 }  // namespace kilvo

@@ -19,8 +19,7 @@ class MovingStart {
   /// `start`: the first estimate, whose gravity and biases are guesses.
   MovingStart(const LidarMount& mount, const EstimatorConfig& config, const Estimate& start);
 
-  /// The parts of the next sweep correct the history, which has come to the sweep's end then. True when any of them was registered.
-  /// `drops`: counts the points that are not used.
+  /// The parts of the next sweep correct the history, up to its end. True when any was registered. `drops`: counts points not used.
   bool add(const LidarScan& scan, History& history, PointDrops& drops);
   /// Another sensor measures the velocity from now on: the result of the sweeps is not kept.
   void give_up(History& history, Time now);

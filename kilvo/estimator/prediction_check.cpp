@@ -58,7 +58,7 @@ PredictionCheck::Surprise PredictionCheck::surprise(const Estimate& prior, const
 Estimate PredictionCheck::released(const Estimate& prior) { return inflated(prior, 0.7 * well_known_rotation, 0.7 * well_known_position); }
 
 Estimate PredictionCheck::lost(const Estimate& prior) const {
-  // A search goes to three standard deviations: all round, and to 2 m.
+  // A search goes to three standard deviations: all round, and to 2 m on the level.
   if (contradicted_sweeps_ + 1 >= enough - 1) return inflated(prior, std::numbers::pi / 3, 2.0 / 3);
   return inflated(prior, 3 * well_known_rotation, 3 * well_known_position);
 }
@@ -109,7 +109,7 @@ void PredictionCheck::learn(const Estimate& prior, const Registration& sweep, co
     const Error off = error_between(prior.x, sweep.posterior.x);
     // A search may have found another place: then predictions were not off by more.
     const auto follow = [&sweep](double& rms, double now) {
-      if (sweep.searched) now = std::min(now, rms);
+      if (sweep.searched || sweep.unpredicted) now = std::min(now, rms);
       rms = std::sqrt(rms * rms + (now * now - rms * rms) / enough);
     };
     follow(error_->turned, off.turned);

@@ -76,8 +76,7 @@ class Replay {
   /// The last estimate remembered that is not later than `t`, else `oldest`.
   const Estimate& nearest(Time t, const Estimate& oldest) const;
 
-  /// The samples after the time of `base` are not used: the accelerometer's are replaced by gravity, and the gyro's by a `rate`, rad/s, if
-  /// there is one, and marked as clipped.
+  /// Samples after `base` are not used: the accelerometer's are replaced by gravity, the gyro's by a `rate`, rad/s, if any, all as clipped.
   void doubt_samples(const Estimate& base, const std::optional<Eigen::Vector3d>& rate);
   /// Of the last seconds, rad/s.
   const Eigen::Vector3d& mean_gyro() const { return usual_.gyro_mean; }

@@ -109,7 +109,7 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
     if (is_contradicted && explains(near) && (is_far || (!agrees(prior, out) && !PredictionCheck::is_small(off))))
       moved = try_with(history.moved(by, within.turned, within.moved));
     // No push changes the velocity by 3 m/s between two sweeps; where that comes again it was none that moved the robot.
-    const bool is_pushed = was_moved_ || off.moved < 3 * to_seconds(prior.t - history.base().t);
+    const bool is_pushed = was_moved_ || off.moved < 3 * to_seconds(prior.t - agreed_);
     constexpr double clearly = 1.03;  // times as many
     if (moved && best && is_pushed && on_surfaces(*moved) < clearly * on_surfaces(*best)) moved.reset();
     if (best && !moved) return prediction_.begin(prior.t, off), best;
@@ -164,6 +164,7 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, 
   }
   if (!is_contradicted && out.carries) {
     was_moved_ = false;
+    agreed_ = prior.t;
     const Motion motion = motion_between(history.base().x, predicted.x);
     usual_motion_.turned2 += (motion.turned2 - usual_motion_.turned2) / PredictionCheck::remembered;
     usual_motion_.pushed2 += (motion.pushed2 - usual_motion_.pushed2) / PredictionCheck::remembered;

@@ -87,7 +87,8 @@ class WorldMap {
   PredictionCheck prediction_;
   Motion usual_motion_;  // between sweeps, as the IMU predicts it: means of the last seconds
   bool is_given_ = false;
-  bool was_moved_ = false;  // the robot, before a sweep that contradicted the prediction; none since agreed with it
+  Time agreed_{};           // of the last sweep that did not contradict the prediction
+  bool was_moved_ = false;  // the robot, before one that did: none since agreed with it
 };
 
 }  // namespace kilvo

@@ -23,7 +23,7 @@ class ClockSteps {
   /// The newest sample of the IMU goes on from the one before, of which follow() reported a `time_jump`: that one is right.
   bool went_on() const { return went_on_; }
 
-  /// How often all time went back by more than an estimator looks back: of a recording that is played again, or another, with own stamps.
+  /// How often all time went back by more than an estimator looks back: another recording is played, and has its own stamps.
   std::uint64_t restarts() const { return restarts_; }
 
   /// How often the IMU's time stepped for good, and by how much it went back at the last time (ahead: negative).

@@ -14,8 +14,7 @@
 
 namespace kilvo {
 
-/// Stamps farther apart than this have nothing to do with each other: a clock has jumped, or nobody is there. So many in a row that agree
-/// with each other show that time really has jumped.
+/// Stamps farther apart have nothing to do with each other: a clock has jumped, or nobody is there. So many in a row that agree show it.
 inline constexpr Duration clock_jump = std::chrono::seconds(1);
 inline constexpr int clock_witnesses = 10;
 

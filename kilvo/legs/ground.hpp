@@ -27,7 +27,7 @@ class GroundLookup {
   /// than 30 degrees. `up_W`: unit vector against gravity.
   static std::optional<GroundPatch> of_map(const VoxelMap& map, const Eigen::Vector3d& p_W, const Eigen::Vector3d& up_W);
 
-  /// The plane through the places where the feet stood last, as far as one explains them all, else level. None before a foot has stood.
+  /// The plane through the last places of the feet, if one explains them all; level where they leave it open. None before a foot has stood.
   std::optional<GroundPatch> of_contacts(const Eigen::Vector3d& up_W) const;
 
   /// The map's, or else that of the contacts.

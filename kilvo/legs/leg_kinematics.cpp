@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 
 #include "kilvo/filter/gap.hpp"
@@ -59,7 +60,7 @@ const std::vector<double>* LegKinematics::Chains::velocity_of(const JointSample&
   if (known) {
     const double share = dt / (dt + smoothing);
     for (std::size_t i = 0; i < velocity.size(); ++i) {
-      const double difference = (s.position[i] - last_position[i]) / dt;
+      const double difference = std::remainder(s.position[i] - last_position[i], 2 * std::numbers::pi) / dt;  // it may turn on and on
       // After a gap or a joint that was not finite the low pass restarts.
       velocity[i] = std::isfinite(velocity[i]) ? velocity[i] + share * (difference - velocity[i]) : difference;
     }

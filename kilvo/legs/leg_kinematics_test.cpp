@@ -226,6 +226,27 @@ TEST(LegKinematics, WithoutVelocitiesTheDifferencesApproachTheTrueOnes) {
   EXPECT_LT(last, 0.01);
 }
 
+TEST(LegKinematics, AJointThatGoesRoundDoesNotJump) {
+  test::Random random(7);
+  const Robot robot = test::biped(random);
+  LegKinematics legs(robot), round(robot);
+  JointSample s = test::random_joints(random);
+  s.velocity.clear();
+  const auto joint = static_cast<std::size_t>(std::ranges::find(s.names, "left_5") - s.names.begin());
+  s.position.at(joint) = M_PI - 0.005;
+  for (int i = 0; i < 20; ++i) {
+    s.t += std::chrono::milliseconds(1);
+    s.position[joint] += 0.001;
+    JointSample within = s;
+    within.position[joint] = std::remainder(s.position[joint], 2 * M_PI);
+    if (i == 0) {
+      EXPECT_EQ(fault_of(legs, s), fault_of(round, within));
+    } else {
+      EXPECT_LT(distance(feet_of(legs, s), feet_of(round, within)), 1e-9);
+    }
+  }
+}
+
 TEST(LegKinematics, WrongVelocitiesAreNotLookedAtWhereThoseOfThePositionsAreWanted) {
   test::Random random(7);
   Robot robot = test::biped(random);

@@ -23,8 +23,7 @@ class LegMotionError {
 
   /// Something else has measured the pose, but for the position along `unknown` (takes an error of the position to its part there).
   void pose_is_measured(const Eigen::Matrix3d& unknown);
-  /// The next state. `velocity_I`: of the IMU as the stance feet measure it, m/s; `weight`: of that, 0 where none stands; `alone`:
-  /// nothing else measures the motion.
+  /// The next state. `velocity_I`: of the IMU by the stance feet, m/s; `weight`: of that, 0 for none; `alone`: by nothing else.
   void add(const State& x, const Eigen::Vector3d& velocity_I, double weight, double dt, bool alone);
   /// To be added to the covariance of `x`, a state at or after the last one that was added.
   PoseCovariance error(const State& x) const;

@@ -58,7 +58,7 @@ class LegPipeline {
   /// Which feet of the step were used, and not refused.
   void judge(const LegStep& step, const std::array<bool, 2>& passed) { stances_.judge(step, passed); }
 
-  /// On the legs alone one foot carries unless the IMU measures a flight, and a long one is none: true when all restarts for that.
+  /// On the legs alone one foot carries unless the IMU measures a short flight: true when none has for so long that all restarts.
   bool has_lost_its_stance(const LegStep& step, bool on_legs_alone);
   /// No foot is missed before `t`.
   void expect_a_stance_from(Time t) { last_stance_ = t; }

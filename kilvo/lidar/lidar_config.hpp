@@ -40,8 +40,7 @@ struct LidarConfig {
   }
 };
 
-/// Of a point, range noise along the beam and bearing noise across it: n' C n along a unit vector n of that covariance C, m^2. `beam`: from
-/// the LiDAR to the point, m, same frame as n.
+/// Of a point, range noise along the beam and bearing noise across it: n' C n along a unit vector n, m^2. `beam`: to it, m, in n's frame.
 inline double point_noise_along(const Eigen::Vector3d& n, const Eigen::Vector3d& beam, const LidarConfig& config) {
   const double range2 = beam.squaredNorm(), cosine2 = n.dot(beam) * n.dot(beam) / range2;
   return config.range_noise * config.range_noise * cosine2 + config.angle_noise * config.angle_noise * range2 * (1 - cosine2);

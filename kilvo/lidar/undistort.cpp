@@ -97,7 +97,7 @@ constexpr float inverse_step = 1.0f / static_cast<float>(step_ns);
   return (halves[0] & halves[1]) == -1;
 }
 
-// Four points of one step at once, with the same operations as one by one. False, and nothing done, where one is not of it, or no point.
+// Four points of one step at once, with the same operations as one by one. False, and nothing done, where one cannot be.
 [[gnu::always_inline]] inline bool move_four(const LidarPoint* p, const Step& step, const Limits& limits, PointXYZI* out) {
   const Int4 offsets = {p[0].offset_ns, p[1].offset_ns, p[2].offset_ns, p[3].offset_ns};
   const Int4 since = offsets - static_cast<int>(step.begin);

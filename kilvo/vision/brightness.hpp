@@ -9,7 +9,7 @@ namespace kilvo {
 double median_of(std::vector<double> values);
 
 /// Logarithms of brightness ratios, most of which differ by little; the others show something else, at any distance.
-/// The maximum of their likelihood with tails of inverse squares: a median follows when a third of them lie on one side, as ahead of a robot.
+/// The maximum of their likelihood with tails of inverse squares: a median follows when a third of them lie on one side, as in a walk.
 struct Brightness {
   double log = 0;
   double spread = 0;  // of one patch

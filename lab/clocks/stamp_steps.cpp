@@ -12,6 +12,7 @@ constexpr std::size_t most_delays = 50, fewest_delays = 10;
 // A step is seen after so long, and is larger than this, and than messages come early or late.
 constexpr Duration shown_for = std::chrono::milliseconds(300), least_step = std::chrono::milliseconds(10);
 constexpr double beyond_scatter = 8;
+constexpr Duration longest_wait = std::chrono::seconds(3);  // for so many messages
 // Of a step: that delays may differ from it.
 constexpr double like_it = 0.3;
 
@@ -44,8 +45,8 @@ void StampSteps::note(Time stamp, Time arrived) {
   const bool jumps = size > std::max(to_seconds(least_step), beyond_scatter * scatter_);
   // What was queued arrives late and then at once, in its order. Stamps that go on are none of a clock that was set back.
   const bool may_be_set = jumps && (by > Duration(0) || stamp < before->stamp);
-  // Stamps that jump to and fro are wrong ones.
-  if (jump_ && may_be_set) {
+  // Stamps that jump to and fro are wrong ones. Without an IMU nothing is known.
+  if (jump_ && (may_be_set || arrived - jump_->arrived > longest_wait)) {
     jump_.reset();
   } else if (jump_) {
     jump_->delays.push_back(delay);

@@ -80,6 +80,18 @@ TEST(StampSteps, AreNoneOfMessagesThatWaitAreLostOrHaveOneWrongStamp) {
   EXPECT_EQ((Stream{.legs_ahead = by(0.3), .waits = bursts}.after().count()), 1);
 }
 
+// The legs go on for ten seconds: nothing of before is held against what the IMU sends then.
+TEST(StampSteps, AreNotKnownWhileTheImuIsSilent) {
+  Stream robot{.legs_ahead = by(0.15)};
+  StampSteps steps;
+  for (const Stream::Message& m : robot.messages()) {
+    const Time arrived = day + from_seconds(m.arrived);
+    if (!m.is_imu) steps.note(day + from_seconds(m.t + robot.legs_ahead(m.t)), arrived);
+    if (m.is_imu && (m.t < 4.9 || m.t > 9)) steps.note_imu(arrived - day - from_seconds(m.t));
+  }
+  EXPECT_EQ(steps.count(), 0);
+}
+
 TEST(StampSteps, OfAnotherRecordingAreForgotten) {
   StampSteps steps = Stream{.legs_ahead = by(0.15)}.after();
   ASSERT_EQ(steps.count(), 1);

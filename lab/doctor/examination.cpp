@@ -167,6 +167,7 @@ Diagnosis Examination::run() {
   examine_lidar();
   lidar_way_ = smoothed_way();
   examine_legs();
+  settle_joint_speeds();
   examine_upright();
   examine_camera();
   blame_imu_for_all();

@@ -146,6 +146,8 @@ class Examination {
   bool accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const;
   bool examine_leg_shape();
   void examine_joint_speeds();
+  /// Positions that are wrong contradict their velocities: one finding, and what mends it does without those.
+  void settle_joint_speeds();
   // leg_mount.cpp, leg_zeros.cpp
   MountFit measure_leg_mount() const;
   void examine_leg_rotation();
@@ -215,6 +217,7 @@ class Examination {
   std::vector<Turn> lidar_turns_, leg_turns_;
   SenseAgreement lidar_, legs_;
   Stepping stepping_;
+  bool speeds_contradict_ = false;  // velocities of joints the change of their positions
   std::optional<LegHypothesis> leg_mend_;
   std::optional<SO3> leg_start_;              // mount of the IMU on its link, far from the described one, from which that is looked for
   double lidar_offset_ = 0, leg_offset_ = 0;  // s: stamps plus this are on the IMU's clock

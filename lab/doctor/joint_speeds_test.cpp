@@ -115,10 +115,39 @@ TEST_F(JointSpeeds, ThatAreNotUsedAreNotJudged) {
   EXPECT_TRUE(Examination(messages, robot).run().good());
 }
 
+// All else is judged as before.
+TEST_F(JointSpeeds, ThatAreNotUsedHideNoOtherFault) {
+  Robot robot = walked_robot();
+  robot.legs.velocities = "positions";
+  const Recorded messages = changed([](LegSample& s) { s.position[3] = 0.3; });
+  const Diagnosis diagnosis = Examination(messages, robot).run();
+  ASSERT_FALSE(diagnosis.findings.empty());
+  EXPECT_EQ(diagnosis.findings[0].cause, "joint_frozen");
+}
+
+// A joint without an end stop, whose value goes round, and a driver that tells no slow velocity.
+TEST_F(JointSpeeds, OfAJointThatTurnsOnAndOnOrWithADeadBandAreGood) {
+  EXPECT_THAT(causes([](LegSample& s) { s.position[3] = std::remainder(s.position[3] + 2.9, 2 * M_PI); }),
+              testing::Not(testing::Contains("joint_velocity")));
+  EXPECT_THAT(causes([](LegSample& s) {
+                for (double& v : s.velocity) v = std::abs(v) < 0.3 ? 0 : v;
+              }),
+              testing::IsEmpty());
+}
+
 TEST_F(JointSpeeds, OfOneJointThatAreAnothersAreNamed) {
   const Diagnosis diagnosis = judged([](LegSample& s) { s.velocity[3] *= -1; });
   ASSERT_EQ(diagnosis.findings.size(), 1u);
   EXPECT_EQ(diagnosis.findings[0].cause, "joint_velocity");
+}
+
+TEST_F(JointSpeeds, OfAJointWhosePositionsAreWrongAreMendedWithIt) {
+  const Diagnosis diagnosis = judged([](LegSample& s) { s.position[3] *= -1; });
+  for (const Finding& finding : diagnosis.findings) {
+    EXPECT_TRUE(finding.cause != "joint_velocity" || diagnosis.findings.size() == 1);
+    if (!finding.cause.starts_with("joint_sign")) continue;
+    EXPECT_EQ(finding.changes.back().key, "legs.velocities");
+  }
 }
 
 // An encoder that jumps now and then is none whose velocities are wrong.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
+#include <numbers>
 
 #include "lab/doctor/examination.hpp"
 #include "lab/doctor/leg_hypotheses.hpp"
@@ -24,18 +25,19 @@ std::vector<JointTurns> joint_turns(const std::vector<LegSample>& legs, const st
   std::vector<JointTurns> out;
   for (const std::size_t joint : joints) {
     out.push_back({joint, {}});
-    double by_velocity = 0;
+    double by_position = 0, by_velocity = 0;
     for (std::size_t k = 1, begin = 0; k < legs.size(); ++k) {
       const LegSample &a = legs[k - 1], &b = legs[k];
       const double dt = b.t - a.t;
       if (!(dt > 0 && dt < longest) || a.velocity.size() != a.position.size() || b.velocity.size() != b.position.size()) {
-        begin = k, by_velocity = 0;
+        begin = k, by_position = by_velocity = 0;
         continue;
       }
+      by_position += std::remainder(b.position[joint] - a.position[joint], 2 * std::numbers::pi);  // of one that turns on and on
       by_velocity += 0.5 * (a.velocity[joint] + b.velocity[joint]) * dt;
       if (b.t - legs[begin].t < span) continue;
-      out.back().turns.push_back({b.position[joint] - legs[begin].position[joint], by_velocity, b.t - legs[begin].t});
-      begin = k, by_velocity = 0;
+      out.back().turns.push_back({by_position, by_velocity, b.t - legs[begin].t});
+      begin = k, by_position = by_velocity = 0;
     }
   }
   return out;
@@ -65,7 +67,8 @@ Directions directions_of(const JointTurns& joint) {
   for (const JointTurn& turn : joint.turns) {
     if (turn.by_position * turn.by_position * static_cast<double>(joint.turns.size()) < squares) continue;
     ++out.count;
-    if (turn.by_position * turn.by_velocity > 0) ++out.same;
+    // Velocities within a dead band say nothing.
+    if (turn.by_position * turn.by_velocity >= 0) out.same += turn.by_velocity == 0 ? 0.5 : 1;
   }
   return out;
 }
@@ -158,7 +161,17 @@ void Examination::examine_joint_speeds() {
            : follow   ? fmt::format("the velocities of the joints are not rad/s: {:.3g} times what they should be", ratio)
                       : "the velocities of the joints do not follow their positions";
   f.changes = {{"legs.velocities", "positions"}};
+  speeds_contradict_ = !follow;
   find(std::move(f));
+}
+
+void Examination::settle_joint_speeds() {
+  auto& all = diagnosis_.findings;
+  const auto of_positions = [](const Finding& f) { return f.cause.starts_with("joint") && f.cause != "joint_velocity"; };
+  const auto wrong = std::ranges::find_if(all, of_positions);
+  if (!speeds_contradict_ || wrong == all.end()) return;
+  if (!wrong->changes.empty()) wrong->changes.push_back({"legs.velocities", "positions"});
+  std::erase_if(all, [](const Finding& f) { return f.cause == "joint_velocity"; });
 }
 
 // By acceleration alone, which soles that roll and joints that bend change by a few hundredths.

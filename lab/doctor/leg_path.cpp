@@ -8,8 +8,11 @@ const LinkTree& RecordedLegs::tree(const Robot& robot) {
   return trees_.try_emplace({robot.urdf, robot.locked_joints, robot.joints}, robot).first->second;
 }
 
+// For poses alone.
 LegKinematics RecordedLegs::kinematics(const Robot& robot) {
-  return robot.urdf.empty() ? LegKinematics(robot) : LegKinematics(robot, false, &tree(robot));
+  Robot still = robot;
+  still.legs.velocities = "messages";
+  return robot.urdf.empty() ? LegKinematics(still) : LegKinematics(still, false, &tree(robot));
 }
 
 std::map<std::string, std::string> RecordedLegs::names_of_joints(const Robot& robot) {

@@ -13,6 +13,7 @@ constexpr Duration patience = std::chrono::seconds(1);
 }  // namespace
 
 std::optional<JointSample> JointAssembly::join(JointSample message, Time arrived) {
+  if (!with_velocities_) message.velocity.clear();
   if (needed_.empty() || message.names.size() != message.position.size()) return message;
   if (message.names != names_) look_up(message.names);
   if (!legs_ || arrived < *legs_ || found_ > 0) legs_ = arrived;
@@ -55,7 +56,9 @@ void JointAssembly::clear_unknown_velocities(JointSample& message) {
     moves = moves || message.velocity[*place] != 0;
   }
   knows_velocities_ = are_finite && moves;
-  if (!knows_velocities_) message.velocity.clear();
+  const auto before = std::exchange(last_positions_, message.position);
+  const bool rests = are_finite && !moves && (before.empty() || before == message.position);
+  if (!knows_velocities_ && !rests) message.velocity.clear();
 }
 
 void JointAssembly::note(const JointSample& part) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <limits>
+#include <span>
 
 namespace kilvo::lab {
 namespace joint_assembly_test {
@@ -105,11 +106,36 @@ TEST(JointAssembly, VelocitiesThatADriverDoesNotKnowAreLeftOut) {
     message.velocity = std::move(velocity);
     return assembly.join(message, message.t).value_or(JointSample{}).velocity;
   };
-  EXPECT_THAT(velocities(0, {0, 0, 1, 0, 0}), ElementsAre());
+  EXPECT_THAT(velocities(0, {0, 0, 1, 0, 0}), ElementsAre(0, 0, 1, 0, 0)) << "it may stand";
+  EXPECT_THAT(velocities(0, {0, 0, 1, 0, 0}), ElementsAre(0, 0, 1, 0, 0)) << "it does";
+  EXPECT_THAT(velocities(1, {0, 0, 1, 0, 0}), ElementsAre()) << "it moves";
   EXPECT_THAT(velocities(2, {nan, 1, 1, nan, 1}), ElementsAre());
   EXPECT_THAT(velocities(4, {0, 1, nan, 0, 1}).size(), 5U);
   EXPECT_THAT(velocities(6, {0, 0, 0, 0, 0}), ElementsAre(0, 0, 0, 0, 0)) << "a robot that stands";
   EXPECT_THAT(velocities(8, {nan, 0, 0, 0, 0}).size(), 5U) << "is refused, not guessed";
+}
+
+TEST(JointAssembly, VelocitiesThatAreNotWantedAreLeftOutOfPartsToo) {
+  for (const JointNames& needed : {both, JointNames{}}) {
+    JointAssembly assembly(needed, false);
+    for (double ms = 0; ms < 20; ms += 2) {
+      for (JointSample& whole : joined(assembly, {part(left, ms), part(right, ms + 1)})) EXPECT_TRUE(whole.velocity.empty());
+    }
+  }
+  // Each is brought to the time of the newer one by the change of its positions, whatever its velocity.
+  JointAssembly assembly(both, false);
+  std::vector<JointSample> messages;
+  for (double ms = 0; ms < 20; ms += 2) {
+    for (JointSample m : {part(left, ms), part(right, ms + 1)}) {
+      for (double& v : m.velocity) v *= 57;
+      messages.push_back(m);
+    }
+  }
+  const auto wholes = joined(assembly, messages);
+  ASSERT_GT(wholes.size(), 5U);
+  for (const JointSample& whole : std::span(wholes).subspan(2)) {
+    for (const double q : whole.position) EXPECT_NEAR(q, 2 * to_seconds(whole.t - begin), 1e-9);
+  }
 }
 
 TEST(JointAssembly, ASlowWaistDoesNotHoldBackFastLegs) {

@@ -30,10 +30,10 @@ struct SensorCounts {
 class SensorIntake {
  public:
   /// `time_offset`: s, added to the stamps (of a scan: to the time that its points count from). `gyro_scale`: of each axis of an IMU.
-  /// `with_colours`: images are to give them. `joints`: that a leg sample must have; parts of them are joined.
+  /// `with_colours`: images are to give them. `joints`, `with_velocities`: see JointAssembly.
   explicit SensorIntake(double time_offset = 0, const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones(), bool with_colours = true,
-                        JointNames joints = {})
-      : time_offset_(time_offset), gyro_scale_(gyro_scale), with_colours_(with_colours), assembly_(std::move(joints)) {}
+                        JointNames joints = {}, bool with_velocities = true)
+      : time_offset_(time_offset), gyro_scale_(gyro_scale), with_colours_(with_colours), assembly_(std::move(joints), with_velocities) {}
 
   /// Nothing when the message cannot be decoded (newest_fault() says why), is a part of a leg sample that the others are not there for, or
   /// has no point that the scan before did not have.

@@ -48,7 +48,8 @@ RecordingSource::RecordingSource(const std::vector<std::filesystem::path>& input
   for (const Sensor sensor : all_sensors) {
     if (!options_[sensor].use) continue;
     const SensorInput& wanted = options_[sensor];
-    intakes_[index_of(sensor)] = SensorIntake(wanted.time_offset, wanted.gyro_scale, options_.with_colours, wanted.joints);
+    intakes_[index_of(sensor)] =
+        SensorIntake(wanted.time_offset, wanted.gyro_scale, options_.with_colours, wanted.joints, wanted.with_velocities);
     try {
       chosen_[index_of(sensor)] = choose_topic(reader_->connections(), sensor, options_[sensor].topic);
     } catch (const InputError& error) {

@@ -27,6 +27,7 @@ struct SensorInput {
   double rate = 0;         // Hz, nominal; 0: unknown. Of the LiDAR it helps to tell the unit of the point times
   double time_offset = 0;  // s, added to the stamps (of a scan: to the time that its points count from)
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();  // of each axis of an IMU
+  bool with_velocities = true;                           // of the joints: those in the messages are used
   JointNames joints = {};                                // that a leg sample must have; messages with a part of them are joined
 };
 
