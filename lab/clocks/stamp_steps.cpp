@@ -10,11 +10,11 @@ namespace {
 // Messages whose delays are compared: before a step at most, and on either side at least.
 constexpr std::size_t most_delays = 50, fewest_delays = 10;
 // A step is seen after so long, and is larger than this, and than messages come early or late.
-constexpr Duration shown_for = std::chrono::milliseconds(300), least_step = std::chrono::milliseconds(10);
+constexpr Duration observed_for = std::chrono::milliseconds(300), least_step = std::chrono::milliseconds(10);
 constexpr double beyond_scatter = 8;
 constexpr Duration longest_wait = std::chrono::seconds(3);  // for so many messages
-// Of a step: that delays may differ from it.
-constexpr double like_it = 0.3;
+// Share of a step by which the delays may differ from it.
+constexpr double tolerated_share = 0.3;
 
 template <class Delays>
 Duration median_of(const Delays& delays) {
@@ -50,7 +50,7 @@ void StampSteps::note(Time stamp, Time arrived) {
     jump_.reset();
   } else if (jump_) {
     jump_->delays.push_back(delay);
-    if (arrived - jump_->arrived > shown_for && std::min(jump_->delays.size(), jump_->of_imu.size()) >= fewest_delays) conclude();
+    if (arrived - jump_->arrived > observed_for && std::min(jump_->delays.size(), jump_->of_imu.size()) >= fewest_delays) conclude();
     return;
   }
   if (may_be_set && std::min(delays_.size(), of_imu_.size()) >= fewest_delays) {
@@ -65,7 +65,7 @@ void StampSteps::note(Time stamp, Time arrived) {
 void StampSteps::conclude() {
   const Jump jump = *std::exchange(jump_, std::nullopt);
   const Duration change = median_of(jump.delays) - median_of(delays_), of_imu = median_of(jump.of_imu) - jump.imu_before;
-  const Duration tolerance(static_cast<Duration::rep>(like_it * static_cast<double>(std::chrono::abs(jump.by).count())));
+  const Duration tolerance(static_cast<Duration::rep>(tolerated_share * static_cast<double>(std::chrono::abs(jump.by).count())));
   const bool is_step = std::chrono::abs(change + jump.by) < tolerance && std::chrono::abs(of_imu) < tolerance;
   if (is_step) correction_ += change;
   if (is_step) ++count_;

@@ -65,7 +65,8 @@ std::optional<Measurement> SensorIntake::take(Sensor sensor, std::string_view ty
       take_back("repeated");
       return std::nullopt;
     }
-    stamp = even_sweeps_.follow(stamp, begin_of(*scan), end_of(*scan));
+    const OffsetRange offsets = offsets_of(*scan);
+    stamp = even_sweeps_.follow(stamp, stamp + Duration(offsets.first), stamp + Duration(offsets.last));
   }
   if (const double scatter = even_sweeps_.scatter().value_or(0); scatter > remarkable_scatter) scatter_ = scatter;
   if (even_samples_.lateness()) lateness_ = *even_samples_.lateness();
