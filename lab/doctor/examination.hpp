@@ -141,6 +141,7 @@ class Examination {
   void find_on_legs(Finding finding, const LegHypothesis& h);
   // leg_accelerating.cpp
   LegAcceleration leg_acceleration(const LegHypothesis* hypothesis, const SO3& R_link_imu, double offset) const;
+  LegAcceleration leg_acceleration(const std::vector<LegPose>& path, const SO3& R_link_imu, double offset) const;
   bool try_acceleration_hypotheses();
   void examine_leg_size();
   bool accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const;
@@ -164,6 +165,7 @@ class Examination {
     std::optional<double> uneven;  // m: how much lower the left sole is than the right one where the robot stands
   };
   LegWay measure_leg_way(const LegHypothesis* hypothesis) const;
+  void measure_leg_size(LegWay& way) const;
   bool accuse_exchanged_legs(double scale, const std::string& evidence);
   void examine_leg_lengths();
   bool accuse_lidar_instead(double scale, const std::string& evidence);

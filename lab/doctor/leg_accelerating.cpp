@@ -76,45 +76,92 @@ Directions directions_of(const JointTurns& joint) {
 }  // namespace
 
 LegAcceleration Examination::leg_acceleration(const LegHypothesis* hypothesis, const SO3& R_link_imu, double offset) const {
-  // The acceleration is not what was measured.
-  if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "accel_gravity"; })) return {};
-  return fit_leg_acceleration(legs_under(hypothesis), mended_imu(), gyro(), {R_link_imu, robot_.imu.T_link_imu.p}, offset);
+  return leg_acceleration(legs_under(hypothesis), R_link_imu, offset);
 }
 
-// Joints and soles that turn as the gyro does, or hardly turn, may still not accelerate as the robot does.
+LegAcceleration Examination::leg_acceleration(const std::vector<LegPose>& path, const SO3& R_link_imu, double offset) const {
+  // The acceleration is not what was measured.
+  if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "accel_gravity"; })) return {};
+  return fit_leg_acceleration(path, mended_imu(), gyro(), {R_link_imu, robot_.imu.T_link_imu.p}, offset);
+}
+
+// Joints and soles that turn as the gyro does, or hardly turn, may still not accelerate as the robot does. Where soles turn on the ground,
+// and their turning tells nothing, the mount of the IMU and the clock show here as well.
 bool Examination::try_acceleration_hypotheses() {
   if (!lidar_way().empty()) return false;
   const SO3 R = robot_.imu.T_link_imu.R;
-  const LegAcceleration described = leg_acceleration(nullptr, R, leg_offset_);
+  const auto of_gyro = [](const Finding& f) { return f.cause.starts_with("gyro") || f.cause == "imu_axes"; };
+  const bool turning_is_hidden = !legs_.known && legs_.turned && std::ranges::none_of(diagnosis_.findings, of_gyro);
+  const std::vector<LegPose> path = legs_under(nullptr);
+  const LegAcceleration described = leg_acceleration(path, R, leg_offset_);
   constexpr double well = 0.95;  // of the acceleration
   if (described.rows == 0 || described.explained > well) return false;
+  struct Candidate {
+    const LegHypothesis* legs = nullptr;
+    SO3 R;
+    double offset = 0;
+    LegAcceleration fit;
+  };
   std::vector<LegHypothesis> all = leg_hypotheses(recorded_legs_, robot_);
   for (LegHypothesis& h : foot_link_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
-  const LegHypothesis* best = nullptr;
-  LegAcceleration then;
-  double least = 1 - well;
+  std::vector<Candidate> candidates;
   for (const LegHypothesis& h : all) {
-    if (h.culprit != Sensor::legs) continue;
-    const LegAcceleration other = leg_acceleration(&h, R, leg_offset_);
-    // Many are tried: one that needs another mount or size besides fits by chance.
-    constexpr double near = 0.1, alike = 1.1;  // rad, -
+    // The turning tells the link of the IMU better, if it tells anything.
+    if (h.culprit == Sensor::legs || (turning_is_hidden && !turns_with_link(h))) candidates.push_back({&h, R, leg_offset_, {}});
+  }
+  if (turning_is_hidden) {
+    constexpr int steps = 13;
+    constexpr double step = 0.1;  // s, which the fit bridges
+    for (const SO3& mount : upright_mounts()) candidates.push_back({nullptr, mount, leg_offset_, {}});
+    for (int k = -steps; k <= steps && !recorded_.reading.leg_clock_is_found; ++k) candidates.push_back({nullptr, R, k * step, {}});
+  }
+  const auto is_possible = [&](const Candidate& c) {
+    // Many are tried: one that needs another mount besides fits by chance; soles that roll seem to turn the robot by 0.16.
+    const double near = turning_is_hidden ? 0.2 : 0.1;  // rad
     // Of a robot that stands, or has walked for two seconds, no size is known.
-    const bool known = other.good && sure * other.scale_sigma < other.least_scale;
-    if (!known || 1 - other.explained >= least || other.turn.norm() > near || other.least_scale > alike || alike * other.most_scale < 1)
-      continue;
-    least = 1 - other.explained;
-    then = other;
-    best = &h;
+    if (!c.fit.good || sure * c.fit.scale_sigma >= c.fit.least_scale || c.fit.turn.norm() >= near) return false;
+    // What soles that roll make of right ones.
+    constexpr double alone_tolerance = 0.2, alone_clock_tolerance = 0.025;  // rad, s
+    if (c.legs == nullptr)
+      return (c.R * R.inverse()).Log().norm() > alone_tolerance || std::abs(c.fit.offset - leg_offset_) > alone_clock_tolerance;
+    // Another link is none that only moves as far.
+    if (c.legs->cause == "foot_link" && c.fit.differs() > 1 - described.explained) return false;
+    // What turns as the gyro does, and legs that are exchanged as a whole, accelerate nearly as well.
+    return (turning_is_hidden && c.legs->cause != "joints_swapped") || c.fit.explained > well;
+  };
+  const Candidate* best = nullptr;
+  for (Candidate& c : candidates) {
+    c.fit = leg_acceleration(c.legs != nullptr ? legs_under(c.legs) : path, c.R, c.offset);
+    constexpr double clearly = 0.9;  // of what the one before leaves, to take its place
+    if (is_possible(c) && c.fit.differs() < (best == nullptr ? INFINITY : clearly * best->fit.differs())) best = &c;
   }
   if (best == nullptr) return false;
-  if (smaller_by(least, 1 - described.explained, std::min(described.independent, then.independent)) < sure_among(all.size())) {
-    seems_wrong(best->culprit) = true;
+  const double then = best->fit.differs(), now = described.good ? described.differs() : 1;
+  constexpr double most = 0.7, much_less = 0.65;
+  if (then > most || then > much_less * now ||
+      smaller_by(then, now, std::min(described.independent, best->fit.independent)) < sure_among(candidates.size())) {
+    const bool is_of_legs = best->legs != nullptr ? best->legs->culprit == Sensor::legs : best->offset != leg_offset_;
+    if (then < much_less * now) seems_wrong(is_of_legs ? Sensor::legs : Sensor::imu) = true;
     return false;
   }
-  Finding f{best->culprit, best->cause, best->name, {}, best->setting, 0, {}, {}, true};
-  f.evidence = fmt::format("{:.1f} % of the acceleration over standing soles is the accelerometer's then, {:.1f} % as described",
-                           100 * then.explained, 100 * described.explained);
-  find_on_legs(std::move(f), *best);
+  const std::string evidence = fmt::format(
+      "the acceleration of the legs over standing soles differs from the accelerometer's by {:.2f} of its square then, by {:.2f} as "
+      "described",
+      then, now);
+  if (best->legs != nullptr) {
+    find_on_legs({best->legs->culprit, best->legs->cause, best->legs->name, evidence, best->legs->setting, 0, {}, {}, true}, *best->legs);
+  } else if (best->offset != leg_offset_) {
+    leg_offset_ = best->fit.offset;
+    find_offset(Sensor::legs, leg_offset_, best->fit.offset_sigma, evidence);
+  } else {
+    const SO3 measured = (best->R.inverse() * SO3::Exp(best->fit.turn)).inverse();
+    Finding f{Sensor::imu, "imu_mount_rotation", {}, evidence, {}, 0, {}, {}, true};
+    f.text = fmt::format("the IMU is turned on its link {} by {} of the link against the description", robot_.imu.link,
+                         turn_text(measured * R.inverse()));
+    f.turn = (measured.inverse() * R).Log();
+    robot_.imu.T_link_imu.R = measured;
+    find_rotation(std::move(f), R, measured, "imu.T_link_imu.R");
+  }
   return true;
 }
 

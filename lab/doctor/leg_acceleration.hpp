@@ -4,6 +4,7 @@
 // the true ratio lies between the regression of the one on the other and that of the other on the one.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "lab/doctor/gyro_path.hpp"
@@ -21,6 +22,9 @@ struct LegAcceleration {
   Eigen::Vector3d turn, sigma;          // rad, frame of the link: true mount of the link on the IMU = described * Exp(turn)
   std::size_t rows = 0;                 // 0: too few
   double independent = 0;               // values in them that do not depend on each other
+  /// Squared difference of the two accelerations by the accelerometer's squared, with legs of the described size: small only where both
+  /// belong together and the size is right.
+  double differs() const { return good ? 1 + least_scale * (most_scale - 2) : INFINITY; }
 };
 
 /// `path`: both feet in the frame of the link. `imu`: SI units, IMU frame. Starts from `offset` (s).

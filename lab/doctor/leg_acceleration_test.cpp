@@ -1,6 +1,7 @@
 // What standing legs say of the acceleration: lengths, mount and clock of a walk that is known.
 #include "lab/doctor/leg_acceleration.hpp"
 
+#include <cmath>
 #include <gtest/gtest.h>
 
 #include "lab/doctor/examination.hpp"
@@ -120,6 +121,46 @@ TEST(LegAcceleration, AccusesNoRightDescription) {
     const Diagnosis diagnosis = Examination(walk.recorded, walk.robot).run();
     EXPECT_TRUE(diagnosis.good()) << cut.name << ": " << diagnosis.findings.front().text;
   }
+}
+
+TEST(LegAcceleration, DiffersLeastAsItIs) {
+  const double right = measured(a_walk(), 1, SO3{}, 0).differs();
+  EXPECT_LT(right, 0.05);
+  EXPECT_GT(measured(a_walk(), 2, SO3{}, 0).differs(), 0.5);
+  EXPECT_GT(measured(a_walk(), 0.5, SO3{}, 0).differs(), 0.2);
+  EXPECT_EQ(LegAcceleration{}.differs(), INFINITY);
+}
+
+/// On soft ground soles turn under the robot: ankles that turn by 3 degrees twice a second.
+Walked on_turning_soles() {
+  Walked walk = walked("room", 0, 24);
+  for (const std::string joint : {"left_ankle_pitch_joint", "left_ankle_roll_joint", "right_ankle_pitch_joint", "right_ankle_roll_joint"}) {
+    const auto place = static_cast<std::size_t>(std::ranges::find(walk.recorded.joint_names, joint) - walk.recorded.joint_names.begin());
+    for (LegSample& s : walk.recorded.legs) {
+      const double turned = 0.06 * std::sin(12 * s.t + static_cast<double>(place));
+      if (place < s.position.size()) s.position[place] += turned;
+    }
+  }
+  return walk;
+}
+
+Diagnosis of_legs_and_imu(const Walked& walk) { return Examination(walk.recorded, walk.robot).run(); }
+
+TEST(LegAcceleration, OnSolesThatTurnShowsWhatTheirTurningHides) {
+  const Walked right = on_turning_soles();
+  EXPECT_TRUE(of_legs_and_imu(right).good());
+  Walked turned = right;
+  turned.robot.imu.T_link_imu.R = SO3::Exp({0, 0, M_PI}) * right.robot.imu.T_link_imu.R;
+  const Diagnosis by_mount = of_legs_and_imu(turned);
+  ASSERT_FALSE(by_mount.findings.empty());
+  EXPECT_EQ(by_mount.findings.front().cause, "imu_mount_rotation");
+  EXPECT_NEAR(by_mount.findings.front().size, 180, 8);
+  Walked late = right;
+  for (LegSample& s : late.recorded.legs) s.t += 0.3;
+  const Diagnosis by_clock = of_legs_and_imu(late);
+  ASSERT_FALSE(by_clock.findings.empty());
+  EXPECT_EQ(by_clock.findings.front().cause, "legs_clock");
+  EXPECT_NEAR(by_clock.findings.front().size, -0.3, 0.03);
 }
 
 }  // namespace leg_acceleration_test

@@ -221,7 +221,7 @@ void Examination::examine_legs() {
   }
   if (!legs_turned() && lidar_way().empty())
     leg_acceleration_ = leg_acceleration(leg_mend_ ? &*leg_mend_ : nullptr, robot_.imu.T_link_imu.R, leg_offset_);
-  if (!legs_turned()) {
+  if (!legs_turned() && !feet_stand()) {
     check(Sensor::legs, "mount of the IMU, clock", Check::Verdict::unknown,
           fmt::format("the robot turned by {:.2f} rad/s only, {:.2f} about one of its axes: walk and turn", legs_.turning, legs_.weakest));
   } else {

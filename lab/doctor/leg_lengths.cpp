@@ -15,7 +15,7 @@ constexpr double least_way = 0.12;              // m in a window
 constexpr double scale_tolerance = 0.035;       // soles that slip and roll take 1 %
 constexpr double agreed_tolerance = 0.013;      // where the robot stands as much higher
 constexpr double slip_tolerance = 0.08;         // of a way that is too short, where nothing tells the height, or that slipping makes
-constexpr double stance_tolerance = 0.02;       // links are known to 1 %
+constexpr double stance_tolerance = 0.025;      // links are known to 1 %, soles roll
 constexpr double leg_height_tolerance = 0.028;  // m: ground that gives way takes 2 cm
 
 struct Lowest {
@@ -142,10 +142,12 @@ class WayOfLegs {
 };
 
 std::string detail_of(double scale, double sigma, std::size_t windows, const std::optional<double>& height) {
+  const bool on_the_spot = windows == 0 && std::isfinite(sigma);
+  const std::string way = on_the_spot ? ", on the spot" : fmt::format(", in {} s", windows);
   return fmt::format(
-      "way by the legs / way by the LiDAR {:.3f}, standard deviation {:.3f}, in {} s; height of the LiDAR by the legs less that by its "
+      "way by the legs / way by the LiDAR {:.3f}, standard deviation {:.3f}{}; height of the LiDAR by the legs less that by its "
       "points {}",
-      scale, sigma, windows, height ? fmt::format("{:.1f} cm", 100 * *height) : "unknown");
+      scale, sigma, way, height ? fmt::format("{:.1f} cm", 100 * *height) : "unknown");
 }
 
 }  // namespace
@@ -171,6 +173,17 @@ Examination::LegWay Examination::measure_leg_way(const LegHypothesis* hypothesis
     if (const auto by_points = height_by_lidar(recorded_.sweeps, way_, up_W, way.still_until())) out.height = *by_legs - *by_points;
   }
   return out;
+}
+
+// Of a robot that stays on the spot: it turns and sways over soles that stand, as far as its legs are long.
+void Examination::measure_leg_size(LegWay& way) const {
+  constexpr double method = 0.02, still = 0.002;  // of the scale, m: soles that roll
+  const LegHypothesis* mend = leg_mend_ ? &*leg_mend_ : nullptr;
+  const StanceFit fit = fit_stances(recorded_legs_, robot_, mend, lidar_way(), gyro(), leg_offset_, {std::nullopt, false, true});
+  if (!fit.good || !(fit.scale > 0) || fit.moved > still) return;
+  way.windows = 0;
+  way.scale = 1 / fit.scale;
+  way.sigma = std::hypot(method, fit.scale_sigma * way.scale * way.scale);
 }
 
 // Legs that turn as the robot does under no change that was tried are wrong where their way is not the LiDAR's: rough encoders walk as far.
@@ -220,12 +233,13 @@ void Examination::examine_leg_lengths() {
     examine_leg_size();
     return;
   }
-  const LegWay way = measure_leg_way(nullptr);
+  LegWay way = measure_leg_way(nullptr);
+  if (!std::isfinite(way.sigma)) measure_leg_size(way);
   const auto& [by_way, sigma, windows, height, uneven] = way;
   // The feet that stand tell it better than the way over soles that roll; a place of the IMU that is wrong would spoil that, and show as a
   // height that these legs do not explain.
   constexpr double floor_is_even = 0.025, legs_are_even = 0.012, far_enough = 0.925;  // m, m, of the way: two legs disagree
-  const bool disagree = by_way + sigma < far_enough && !is_no_way_of_legs(by_way, sigma);
+  const bool disagree = windows > 0 && by_way + sigma < far_enough && !is_no_way_of_legs(by_way, sigma);
   if (uneven && std::abs(*uneven) > (disagree ? legs_are_even : floor_is_even)) {
     accuse_uneven_legs(*uneven);
     return;
@@ -242,7 +256,7 @@ void Examination::examine_leg_lengths() {
   if (scale_wrong && accuse_exchanged_legs(scale, detail_of(scale, sigma, windows, height))) return;
   // The way of a robot that runs, slips or rolls over its soles is not that of its legs, but it stands as high as described.
   const bool slips = scale_wrong && (!explains(scale) || (height && std::abs(*height - expected(scale)) > std::abs(*height)));
-  if (slips && is_no_way_of_legs(scale, sigma)) {
+  if (slips && windows > 0 && is_no_way_of_legs(scale, sigma)) {
     const std::string way_detail = detail_of(scale, sigma, windows, height);
     if (!accuse_lidar_instead(1 / scale, way_detail)) accuse_leg_joints(way_detail);
     return;

@@ -95,14 +95,18 @@ void Examination::examine_leg_rotation() {
   constexpr double near = 15;  // degrees
   if (leg_start_) {
     start.imu.T_link_imu.R = *leg_start_;
-  } else if (fit.fit.good && far > near) {
+  } else if (legs_turned() && fit.fit.good && far > near) {
     start.imu.T_link_imu.R = fit.R.inverse();
   }
   StanceFit stances;
   if (!way.empty())
     stances = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(),
-                          fit.fit.good && !leg_start_ ? fit.offset : leg_offset_);
-  if (stances.good && find_wrong_zero(stances, start)) {
+                          legs_turned() && fit.fit.good && !leg_start_ ? fit.offset : leg_offset_);
+  if (!legs_turned() && !stances.good) {
+    check(Sensor::legs, "mount of the IMU, clock", Check::Verdict::unknown, "the robot hardly turned: walk and turn");
+    return;
+  }
+  if (stances.good && legs_turned() && find_wrong_zero(stances, start)) {
     leg_turns_ = leg_turns(legs_under(nullptr), turn_interval);
     examine_leg_rotation();
     return;
@@ -115,8 +119,8 @@ void Examination::examine_leg_rotation() {
   }
   if (stances.good) {
     adopt(stances.R_link_imu.inverse(), stances.rotation_sigma, stances.offset, stances.offset_sigma, fit);
-    constexpr double stance_method = 0.2, stance_clock_method = 0.0004;  // degrees, s
-    method = stance_method;
+    constexpr double stance_method = 0.2, if_hardly_turned = 0.5, stance_clock_method = 0.0004;  // degrees, degrees, s
+    method = legs_turned() ? stance_method : if_hardly_turned;
     clock_method = stance_clock_method;
   } else if (accelerates && !accelerates_as_it_turns(fit, start.imu.T_link_imu.R)) {
     // Their turning shows a clock that is far off all the same.
@@ -136,7 +140,7 @@ void Examination::examine_leg_rotation() {
   if (!recorded_.reading.leg_clock_is_found) refine_offset(Sensor::legs, fit.offset, fit.offset_sigma(), clock_method);
   if (stances.good) {
     refine_zeros(stances);
-    examine_feet_apart(start);
+    if (legs_turned()) examine_feet_apart(start);
   }
   const Eigen::Vector3d turn = (fit.R * described.inverse()).Log();
   const double angle = degrees(turn.norm()), uncertain = std::hypot(degrees(fit.rotation_sigma().norm()), method);

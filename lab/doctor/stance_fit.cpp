@@ -20,9 +20,9 @@ StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesi
   const Eigen::Index n = stances.unknowns();
   Eigen::VectorXd x = Eigen::VectorXd::Zero(n), prior = Eigen::VectorXd::Constant(n, prior_zero), step(n);
   prior.head<3>().setConstant(INFINITY);
-  prior.segment<3>(Stances::of_p).setConstant(prior_p);
+  prior.segment<3>(Stances::of_p).setConstant(free.size ? INFINITY : prior_p);
   prior[Stances::of_offset] = INFINITY;
-  prior[Stances::of_scale] = prior_scale;
+  prior[Stances::of_scale] = free.size ? INFINITY : prior_scale;
   prior.segment<3>(Stances::of_apart).setConstant(free.apart ? INFINITY : fixed);
   if (free.joint) prior[Stances::of_zeros + static_cast<Eigen::Index>(*free.joint)] = INFINITY;
   step.setConstant(1e-4);

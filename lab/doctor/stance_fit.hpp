@@ -29,10 +29,11 @@ struct StanceFit {
   std::size_t stances = 0;
 };
 
-/// What a fit may change beyond what a careful description is off by: nothing, a joint's zero (of `StanceFit::joints`), where the feet are.
+/// What a fit may change beyond what a careful description is off by: nothing, a joint's zero (of `StanceFit::joints`), where the feet are,
+/// the size of the legs and the place of the IMU.
 struct StanceFreedom {
   std::optional<std::size_t> joint;
-  bool apart = false;
+  bool apart = false, size = false;
 };
 
 /// `hypothesis`: of the legs, may be null. Starts from robot.imu.T_link_imu and `offset`.

@@ -105,6 +105,29 @@ TEST_F(StancesOfAWalk, TellTheMountAndTheClock) {
   EXPECT_NEAR(fit.offset, -0.006, 0.0008);
 }
 
+// A body that moves by 0.5 m/s over a sole moves that by half a millimetre in a millisecond.
+TEST_F(StancesOfAWalk, AreFoundWhereStampsJitter) {
+  Recorded jittering = recorded_;
+  for (std::size_t i = 0; i < jittering.legs.size(); ++i) jittering.legs[i].t += i % 2 == 0 ? 0.0015 : -0.0015;
+  RecordedLegs right(recorded_), legs(jittering);
+  const StanceFit without = fit_stances(right, robot_, nullptr, way_, gyro_, 0), with = fit_stances(legs, robot_, nullptr, way_, gyro_, 0);
+  ASSERT_TRUE(without.good);
+  ASSERT_TRUE(with.good);
+  EXPECT_GE(static_cast<double>(with.stances), 0.8 * static_cast<double>(without.stances));
+  EXPECT_LT((with.R_link_imu * robot_.imu.T_link_imu.R.inverse()).Log().norm(), 0.004);
+}
+
+TEST_F(StancesOfAWalk, TellTheSizeOfTheLegsWhereItIsFree) {
+  BipedShape larger = config().shape;
+  larger.thigh *= 1.1, larger.shin *= 1.1;
+  Robot described = robot_;
+  described.urdf = urdf_of(larger);
+  RecordedLegs legs(recorded_);
+  const StanceFit fit = fit_stances(legs, described, nullptr, way_, gyro_, 0, {std::nullopt, false, true});
+  ASSERT_TRUE(fit.good);
+  EXPECT_NEAR(fit.scale, 1 / 1.1, 0.03);
+}
+
 TEST_F(StancesOfAWalk, TellAZeroThatIsFarOffWhereItIsFree) {
   Recorded bent = recorded_;
   const auto knee = static_cast<std::size_t>(std::ranges::find(bent.joint_names, "right_knee_joint") - bent.joint_names.begin());

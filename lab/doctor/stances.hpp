@@ -76,17 +76,10 @@ class Stances {
     const double slow = still[first ? 0 : 1], slow_turn = still_turn[first ? 0 : 1];
     for (std::size_t f = 0; f < 2; ++f) {
       std::size_t begin = 0;
-      std::optional<SE3> last;
-      for (std::size_t i = 0; i <= samples_.size(); ++i) {
-        const std::optional<SE3> now = i < samples_.size() ? sole_at(x, i, f) : std::nullopt;
-        const double dt = i > 0 && now ? samples_[i].t - samples_[i - 1].t : 1;
-        const bool stands = now && last && dt < 2 * sample_period && (now->p - last->p).norm() < slow * dt &&
-                            (last->R.inverse() * now->R).Log().norm() < slow_turn * dt;
-        if (!stands) {
-          if (i >= begin + shortest + 2 * edge) stances_.push_back({f, begin + edge, i - edge});
-          begin = i;
-        }
-        last = now;
+      for (std::size_t i = 1; i <= samples_.size(); ++i) {
+        if (i < samples_.size() && stands(x, i - std::min(i - begin, far), i, f, slow, slow_turn)) continue;
+        if (i >= begin + shortest + 2 * edge) stances_.push_back({f, begin + edge, i - edge});
+        begin = i;
       }
     }
     std::ranges::sort(stances_, {}, &Stance::begin);
@@ -154,9 +147,10 @@ class Stances {
  private:
   static constexpr double sample_period = 0.019;  // s between samples
   // m/s, rad/s, of a sole that stands: as far as it is known before and after the first fit. Soles that roll seem to stand, too.
-  static constexpr double still[] = {0.15, 0.06}, still_turn[] = {0.45, 0.2};
+  static constexpr double still[] = {0.15, 0.05}, still_turn[] = {0.45, 0.15};
   static constexpr std::size_t shortest = 8;    // samples of a stance
   static constexpr std::size_t edge = 2;        // samples at either end, where soles roll
+  static constexpr std::size_t far = 3;         // samples, of which a sole's speed is taken: stamps jitter
   static constexpr double stance_slack = 0.02;  // s
   static constexpr double nudge = 1e-4;         // rad
 
@@ -213,6 +207,14 @@ class Stances {
         sole.by_R.col(j) = (sole.R.inverse() * pose.foot[f].R_IF).Log() / nudge;
       }
     }
+  }
+
+  // From one sample to another, which follow each other closely.
+  bool stands(const Eigen::VectorXd& x, std::size_t from, std::size_t to, std::size_t f, double slow, double slow_turn) const {
+    if (samples_[to].t - samples_[to - 1].t >= 2 * sample_period) return false;
+    const std::optional<SE3> a = sole_at(x, from, f), b = sole_at(x, to, f);
+    const double dt = samples_[to].t - samples_[from].t;
+    return a && b && (b->p - a->p).norm() < slow * dt && (a->R.inverse() * b->R).Log().norm() < slow_turn * dt;
   }
 
   // Where the IMU was at each sample, which of all unknowns the clock alone changes.

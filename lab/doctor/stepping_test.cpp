@@ -48,6 +48,19 @@ TEST(Stepping, OnTheSpotCounts) {
   EXPECT_TRUE(stepping_of(legs(8, [](double t) { return Eigen::Vector3d(0, 0, stride(t).x() / 5); })).walks());
 }
 
+TEST(Stepping, IsNoneOfAPostureThatChangesInStages) {
+  const auto stages = [](double t) { return Eigen::Vector3d(0.1 * (std::tanh(t - 8) + std::tanh(t - 20) + std::tanh(t - 32)), 0, 0); };
+  EXPECT_FALSE(stepping_of(legs(40, stages)).walks());
+}
+
+// It sets one foot before the other all the time, the other way round when it turns back.
+TEST(Stepping, OfARobotThatTurnsOnTheSpotCounts) {
+  const auto turning = [](double t) { return Eigen::Vector3d((t < 18 ? 0.06 : -0.07) + 0.14 * stride(t).x(), 0, 0); };
+  const Stepping steps = stepping_of(legs(33, turning));
+  EXPECT_GT(steps.steps, 40) << "of 60: a few about the time when it turns back are missed";
+  EXPECT_NEAR(steps.seconds(), 30, 2);
+}
+
 /// Legs and IMU of a simulated walk of 12 s, of which it stands for 3 s first.
 class LyingRobot : public testing::Test {
  protected:
