@@ -158,6 +158,7 @@ class Examination {
   void examine_feet_apart(const Robot& start);
   bool find_wrong_zero(const StanceFit& stances, const Robot& start);
   void settle_imu_link(const SO3& measured);
+  void find_turned_imu(const SO3& measured, const std::string& evidence);
   struct LegWay {
     double scale = 1, sigma = 0;  // way by the legs through way by the LiDAR
     std::size_t windows = 0;

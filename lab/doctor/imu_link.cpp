@@ -57,8 +57,15 @@ void Examination::settle_imu_link(const SO3& measured) {
     find(std::move(f));
     return;
   }
+  find_turned_imu(measured, {});
+}
+
+void Examination::find_turned_imu(const SO3& measured, const std::string& evidence) {
+  const SO3 described = robot_.imu.T_link_imu.R;
+  Finding f{Sensor::imu, "imu_mount_rotation", {}, evidence, {}, 0, {}, {}, true};
   f.text = fmt::format("the IMU is turned on its link {} by {} of the link against the description", robot_.imu.link,
                        turn_text(measured * described.inverse()));
+  f.turn = (measured.inverse() * described).Log();
   robot_.imu.T_link_imu.R = measured;
   find_rotation(std::move(f), described, measured, "imu.T_link_imu.R");
 }

@@ -154,13 +154,7 @@ bool Examination::try_acceleration_hypotheses() {
     leg_offset_ = best->fit.offset;
     find_offset(Sensor::legs, leg_offset_, best->fit.offset_sigma, evidence);
   } else {
-    const SO3 measured = (best->R.inverse() * SO3::Exp(best->fit.turn)).inverse();
-    Finding f{Sensor::imu, "imu_mount_rotation", {}, evidence, {}, 0, {}, {}, true};
-    f.text = fmt::format("the IMU is turned on its link {} by {} of the link against the description", robot_.imu.link,
-                         turn_text(measured * R.inverse()));
-    f.turn = (measured.inverse() * R).Log();
-    robot_.imu.T_link_imu.R = measured;
-    find_rotation(std::move(f), R, measured, "imu.T_link_imu.R");
+    find_turned_imu((best->R.inverse() * SO3::Exp(best->fit.turn)).inverse(), evidence);
   }
   return true;
 }

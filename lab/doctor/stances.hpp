@@ -75,9 +75,18 @@ class Stances {
     stances_.clear();
     const double slow = still[first ? 0 : 1], slow_turn = still_turn[first ? 0 : 1];
     for (std::size_t f = 0; f < 2; ++f) {
+      std::vector<std::optional<SE3>> soles;
+      for (std::size_t i = 0; i < samples_.size(); ++i) soles.push_back(sole_at(x, i, f));
+      // From one sample to another.
+      const auto rests = [&](std::size_t from, std::size_t to) {
+        const double dt = samples_[to].t - samples_[from].t;
+        return samples_[to].t - samples_[to - 1].t < 2 * sample_period && soles[from] && soles[to] &&
+               (soles[to]->p - soles[from]->p).norm() < slow * dt &&
+               (soles[from]->R.inverse() * soles[to]->R).Log().norm() < slow_turn * dt;
+      };
       std::size_t begin = 0;
       for (std::size_t i = 1; i <= samples_.size(); ++i) {
-        if (i < samples_.size() && stands(x, i - std::min(i - begin, far), i, f, slow, slow_turn)) continue;
+        if (i < samples_.size() && rests(i - std::min(i - begin, far), i)) continue;
         if (i >= begin + shortest + 2 * edge) stances_.push_back({f, begin + edge, i - edge});
         begin = i;
       }
@@ -207,14 +216,6 @@ class Stances {
         sole.by_R.col(j) = (sole.R.inverse() * pose.foot[f].R_IF).Log() / nudge;
       }
     }
-  }
-
-  // From one sample to another, which follow each other closely.
-  bool stands(const Eigen::VectorXd& x, std::size_t from, std::size_t to, std::size_t f, double slow, double slow_turn) const {
-    if (samples_[to].t - samples_[to - 1].t >= 2 * sample_period) return false;
-    const std::optional<SE3> a = sole_at(x, from, f), b = sole_at(x, to, f);
-    const double dt = samples_[to].t - samples_[from].t;
-    return a && b && (b->p - a->p).norm() < slow * dt && (a->R.inverse() * b->R).Log().norm() < slow_turn * dt;
   }
 
   // Where the IMU was at each sample, which of all unknowns the clock alone changes.

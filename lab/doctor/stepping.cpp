@@ -5,7 +5,6 @@
 #include <cmath>
 
 namespace kilvo::lab {
-
 namespace {
 
 Eigen::Vector3d apart(const LegPose& pose) { return pose.foot[1].p[0] - pose.foot[0].p[0]; }
