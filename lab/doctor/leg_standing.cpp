@@ -24,8 +24,11 @@ bool Examination::find_leg_start() {
   const LegHypothesis* mend = leg_mend_ ? &*leg_mend_ : nullptr;
   const Standing described = standing_time(recorded_legs_, robot_, mend, way, path, 0);
   constexpr double enough = 0.1;  // of the time in which the robot moves: soles that seem to stand by chance do so for a hundredth of it
-  if (described.worth() > enough * described.moving) return false;
-  const LegStart start = longest_standing(recorded_legs_, robot_, mend, way, path, upright_mounts());
+  if (described.worth() > enough * described.moving && feet_stand()) return false;
+  LegStart start = longest_standing(recorded_legs_, robot_, mend, way, path, upright_mounts());
+  if (start.standing.worth() < clearly * described.worth() + least_standing) {
+    start = fitted_standing(recorded_legs_, robot_, mend, way, path, upright_mounts());
+  }
   if (start.standing.worth() < clearly * described.worth() + least_standing) return false;
   if (try_standing_hypotheses(start.standing.worth())) return true;
   leg_offset_ = start.offset;
@@ -58,48 +61,61 @@ bool Examination::try_standing_hypotheses(double longer_than) {
     return standing_time(recorded_legs_, robot_, &both, way, path, leg_offset_);
   };
   const Standing described = stands(nullptr);
-  double most = std::max(longer_than, clearly * described.worth() + least_standing), longer = clearly * described.both();
+  struct Longest {
+    const LegHypothesis* hypothesis = nullptr;
+    Standing standing;
+    double next = 0;  // s: worth of the second
+  } best;
+  double most = std::max(longer_than, clearly * described.worth() + least_standing);
+  const auto longest_of = [&](const std::vector<LegHypothesis>& all, double longer) {
+    Longest out;
+    for (const LegHypothesis& h : all) {
+      // The turning tells the link of the IMU better, if it tells anything.
+      if (h.culprit != Sensor::legs && (legs_.known || turns_with_link(h))) continue;
+      const Standing s = stands(&h);
+      if (s.worth() > std::max(most, out.standing.worth()) && s.both() > longer) {
+        out = {&h, s, out.standing.worth()};
+      } else {
+        out.next = std::max(out.next, s.worth());
+      }
+    }
+    return out;
+  };
   // Soles that stand that long leave no room for others that would stand clearly longer, but for those on links above the ankles.
-  constexpr double well = 0.45, as_feet_do = 0.35;  // of the time in which the robot moves
-  std::vector<LegHypothesis> all;
-  if (described.worth() < well * described.moving) all = leg_hypotheses(recorded_legs_, robot_);
-  const std::size_t first_gross = all.size();
-  std::size_t end_of_gross = first_gross;
-  if (described.worth() < least_standing) {
-    for (LegHypothesis& h : gross_leg_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
-    end_of_gross = all.size();
-    for (LegHypothesis& h : size_hypotheses()) all.push_back(std::move(h));
+  constexpr double well = 0.45, as_feet_do = 0.35, hardly = 0.1;  // of the time in which the robot moves
+  const double longer = clearly * described.both();
+  std::vector<LegHypothesis> plain, gross, sizes;
+  if (described.worth() < well * described.moving) {
+    plain = leg_hypotheses(recorded_legs_, robot_);
+    best = longest_of(plain, longer);
+    most = std::max(most, best.standing.worth());
   }
-  const std::size_t joints = all.size();
+  // What one change explains needs no zero that is a quarter turn off.
+  if (described.worth() < std::max(least_standing, hardly * described.moving) && best.standing.worth() <= as_feet_do * described.moving) {
+    gross = gross_leg_hypotheses(recorded_legs_, robot_);
+    // Among many that are far off one stands a little by chance, and others nearly as long.
+    if (const Longest far = longest_of(gross, longer);
+        far.hypothesis != nullptr && far.standing.worth() > std::min(as_feet_do * far.standing.moving, 2 * far.next + least_standing))
+      best = far;
+  }
+  if (best.hypothesis == nullptr && described.worth() < least_standing) {
+    sizes = size_hypotheses();
+    best = longest_of(sizes, longer);
+  }
   // A link above an ankle that hardly turns stands nearly as well, and on soft ground, in which no sole stands, better: only a link that
   // stands far better, and as feet do.
-  for (LegHypothesis& h : foot_link_hypotheses(recorded_legs_, robot_)) all.push_back(std::move(h));
-  const LegHypothesis* best = nullptr;
-  Standing then;
-  for (const LegHypothesis& h : all) {
-    const auto k = static_cast<std::size_t>(&h - all.data());
-    // What one change explains needs no zero that is a quarter turn off.
-    if (k == first_gross && best != nullptr && then.worth() > as_feet_do * then.moving) break;
-    if (k == joints) {
-      if (best != nullptr) break;
-      longer = std::max(2 * described.both() + least_standing, as_feet_do * described.moving);
-    }
-    // The turning tells the link of the IMU better, if it tells anything.
-    if (h.culprit != Sensor::legs && (legs_.known || turns_with_link(h))) continue;
-    const Standing s = stands(&h);
-    if (s.worth() <= most || s.both() <= longer) continue;
-    // Among many that are far off one stands a little by chance.
-    if (k >= first_gross && k < end_of_gross && s.worth() < as_feet_do * s.moving) continue;
-    most = s.worth();
-    then = s;
-    best = &h;
+  std::vector<LegHypothesis> links;
+  if (best.hypothesis == nullptr) {
+    links = foot_link_hypotheses(recorded_legs_, robot_);
+    best = longest_of(links, std::max(2 * described.both() + least_standing, as_feet_do * described.moving));
   }
-  if (best == nullptr) return false;
-  Finding f{best->culprit, best->cause, best->name, {}, best->setting, 0, {}, {}, true};
+  if (best.hypothesis == nullptr) return false;
+  const LegHypothesis& h = *best.hypothesis;
+  Finding f{h.culprit, h.cause, h.name, {}, h.setting, 0, {}, {}, true};
   f.evidence =
       fmt::format("by the LiDAR's way the soles stand for {:.1f} and {:.1f} s of the walk then, for {:.1f} and {:.1f} s as described",
-                  then.of[0], then.of[1], described.of[0], described.of[1]);
-  find_on_legs(std::move(f), *best);
+                  best.standing.of[0], best.standing.of[1], described.of[0], described.of[1]);
+  find_on_legs(std::move(f), h);
   return true;
 }
 
@@ -107,7 +123,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
 bool Examination::feet_stand() const {
   const LidarWay& way = lidar_way();
   if (way.empty()) return false;
-  constexpr double still = 0.002, near = 0.09;  // m, rad
+  constexpr double still = 0.002, near = 0.35;  // m, rad: of a mount; another would not let them stand
   Robot start = robot_;
   if (leg_start_) start.imu.T_link_imu.R = *leg_start_;
   const StanceFit fit = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(), leg_offset_);

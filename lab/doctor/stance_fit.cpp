@@ -1,5 +1,8 @@
 #include "lab/doctor/stance_fit.hpp"
 
+#include <algorithm>
+#include <functional>
+
 #include "lab/doctor/stances.hpp"
 
 namespace kilvo::lab {
@@ -37,6 +40,8 @@ StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesi
     fit = robust_fit(rows, none, prior / std::sqrt(stances.repeated()), step, 8, derivative);
     if (!fit.good) return out;
     x = fit.x;
+    // Beyond, the clock changes nothing more.
+    if (std::abs(x[Stances::of_offset]) > Stances::stance_slack) return out;
   }
   out.good = fit.groups > static_cast<std::size_t>(10 * n);
   out.R_link_imu = stances.rotation(x);
@@ -64,19 +69,42 @@ Standing standing_time(RecordedLegs& legs, const Robot& robot, const LegHypothes
   return Stances(legs, robot, hypothesis, way, gyro, offset, false).standing();
 }
 
-LegStart longest_standing(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
-                          const GyroPath& gyro, const std::vector<SO3>& mounts, double reach) {
-  const SO3 described = robot.imu.T_link_imu.R;
-  Stances stances(legs, robot, hypothesis, way, gyro, 0, false);
-  LegStart best;
-  const auto attempt = [&](double offset, const SO3& R) {
-    const Standing s = stances.standing(offset, R);
-    if (s.worth() > best.standing.worth()) best = {offset, R, s};
-  };
+namespace {
+
+// The best `count` of the clocks with the described mount and of the mounts without an offset.
+std::vector<LegStart> longest(Stances& stances, const SO3& described, const std::vector<SO3>& mounts, double reach, bool roughly,
+                              std::size_t count) {
+  std::vector<LegStart> out;
   constexpr double step = 0.02;  // s, which the fit of the stances bridges
   const int steps = static_cast<int>(reach / step);
-  for (int k = -steps; k <= steps; ++k) attempt(k * step, described);
-  for (const SO3& mount : mounts) attempt(0, mount);
+  for (int k = -steps; k <= steps; ++k) out.push_back({k * step, described, stances.standing(k * step, described, roughly)});
+  for (const SO3& mount : mounts) out.push_back({0, mount, stances.standing(0, mount, roughly)});
+  std::ranges::stable_sort(out, std::ranges::greater(), [](const LegStart& s) { return s.standing.worth(); });
+  out.resize(std::min(out.size(), count));
+  return out;
+}
+
+}  // namespace
+
+LegStart longest_standing(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
+                          const GyroPath& gyro, const std::vector<SO3>& mounts, double reach) {
+  Stances stances(legs, robot, hypothesis, way, gyro, 0, false);
+  return longest(stances, robot.imu.T_link_imu.R, mounts, reach, false, 1).front();
+}
+
+LegStart fitted_standing(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
+                         const std::vector<SO3>& mounts, double reach) {
+  constexpr std::size_t tried = 4;
+  Stances stances(legs, robot, hypothesis, way, gyro, 0, false);
+  LegStart best;
+  for (LegStart start : longest(stances, robot.imu.T_link_imu.R, mounts, reach, true, tried)) {
+    Robot turned = robot;
+    turned.imu.T_link_imu.R = start.R_link_imu;
+    const StanceFit fit = fit_stances(legs, turned, hypothesis, way, gyro, start.offset);
+    if (!fit.good) continue;
+    start = {fit.offset, fit.R_link_imu, stances.standing(fit.offset, fit.R_link_imu)};
+    if (start.standing.worth() > best.standing.worth()) best = start;
+  }
   return best;
 }
 

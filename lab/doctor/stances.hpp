@@ -16,7 +16,8 @@ namespace kilvo::lab {
 
 class Stances {
  public:
-  static constexpr double clock_step = 2e-4;  // s, for derivatives
+  static constexpr double clock_step = 2e-4;    // s, for derivatives
+  static constexpr double stance_slack = 0.02;  // s, by which the clock may be off the one that the fit starts from
   // m, rad: of the rows. A sole tilts with the load on it by a tenth of a degree, in step with the gait, while its middle stays where it
   // is.
   static constexpr double unit_p = 0.003, unit_R = 0.03;
@@ -48,8 +49,8 @@ class Stances {
     return std::max(1.0, samples / (2 * static_cast<double>(stances_.size())));
   }
 
-  Standing standing() {
-    find(Eigen::VectorXd::Zero(unknowns()), false);
+  Standing standing(bool roughly = false) {
+    find(Eigen::VectorXd::Zero(unknowns()), roughly);
     Standing out;
     std::vector<double> moving(samples_.size(), 0);
     for (std::size_t i = 1; i < samples_.size(); ++i) {
@@ -63,10 +64,10 @@ class Stances {
   }
 
   /// With another clock and another mount.
-  Standing standing(double offset, const SO3& R_link_imu) {
+  Standing standing(double offset, const SO3& R_link_imu, bool roughly = false) {
     offset_ = offset;
     T_LI_.R = R_link_imu;
-    return standing();
+    return standing(roughly);
   }
 
   /// Where the soles seem to stand with these values.
@@ -157,11 +158,10 @@ class Stances {
   static constexpr double sample_period = 0.019;  // s between samples
   // m/s, rad/s, of a sole that stands: as far as it is known before and after the first fit. Soles that roll seem to stand, too.
   static constexpr double still[] = {0.15, 0.05}, still_turn[] = {0.45, 0.15};
-  static constexpr std::size_t shortest = 8;    // samples of a stance
-  static constexpr std::size_t edge = 2;        // samples at either end, where soles roll
-  static constexpr std::size_t far = 3;         // samples, of which a sole's speed is taken: stamps jitter
-  static constexpr double stance_slack = 0.02;  // s
-  static constexpr double nudge = 1e-4;         // rad
+  static constexpr std::size_t shortest = 8;  // samples of a stance
+  static constexpr std::size_t edge = 2;      // samples at either end, where soles roll
+  static constexpr std::size_t far = 3;       // samples, of which a sole's speed is taken: stamps jitter
+  static constexpr double nudge = 1e-4;       // rad
 
   /// By the unknowns: of a sole's place in the world, and of its turn in its own frame.
   using SoleChange = Eigen::Matrix<double, 6, Eigen::Dynamic>;
