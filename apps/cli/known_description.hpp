@@ -18,8 +18,8 @@ struct KnownDescription {
   int round = 1;
   /// The data may still stop the run: as described, and as mended.
   bool is_judged() const { return round == 1 || (round == 2 && !mended.empty()); }
-  /// A run with such a description is not to go on.
-  bool stops(const lab::WrongDescription& found) const { return found.spoils || (round == 1 && found.is_mendable); }
+  /// A run with such a description is not to go on. What changes on the way ends it as a failure.
+  bool stops(const lab::WrongDescription& found) const { return !found.has_changed && (found.spoils || (round == 1 && found.is_mendable)); }
 };
 
 /// Before the first round, where calibration.online asks for it: what the first minute of the recording says more exactly than the

@@ -116,9 +116,10 @@ class Run {
       const lab::Finding& finding = wrong.finding;
       facts_.warnings.push_back(fmt::format("{}; {}", finding.text, finding.remedy));
       files_.write_description(wrong.t, finding.sensor, wrong.spoils, finding.size, facts_.warnings.back());
-      if (facts_.failure.empty() && wrong.spoils)
-        facts_.failure = fmt::format("the robot's description is wrong: {} (kilvo doctor shows the evidence){}", finding.text,
-                                     consequence(known_, used_, facts_.sensors));
+      if (!facts_.failure.empty() || !wrong.spoils) continue;
+      facts_.failure = wrong.has_changed ? finding.text
+                                         : fmt::format("the robot's description is wrong: {} (kilvo doctor shows the evidence){}",
+                                                       finding.text, consequence(known_, used_, facts_.sensors));
     }
   }
 

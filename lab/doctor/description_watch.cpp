@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fmt/core.h>
 #include <string_view>
+#include <utility>
 
 #include "lab/doctor/examination.hpp"
 
@@ -13,8 +15,11 @@ namespace {
 // s of a window after which it is judged. A robot that stands first and then walks shows most by the first, the rest by the last.
 constexpr std::array<double, 2> dues{9, 14};
 constexpr double least_turned = 0.5;  // rad, below which a window tells nothing of mounts and clocks
-constexpr int most_windows = 2;       // in which the robot moved: what they leave open stays open
-constexpr double backwards = 1;       // s: another recording begins
+constexpr int most_windows = 2;       // of the first ones, in which the robot moved
+// Legs and IMU alone: a long window for what those have left open, then, if they are known, one after the other.
+constexpr double open = 60, later = 30;  // s
+constexpr double backwards = 1;          // s: another recording begins
+constexpr double lidar_silent = 2;       // s, after which nothing contradicts legs and IMU
 
 // What the estimator finds and corrects by itself, or only becomes less accurate by, is a warning.
 bool spoils(const Finding& finding) {
@@ -82,17 +87,19 @@ void DescriptionWatch::take(const Measurement& measurement) {
   const std::lock_guard lock(mutex_);
   if (over_) return;
   const Time t = stamp_of(measurement);
+  if (sensor == Sensor::lidar) last_lidar_ = t;
+  if (phase_ != Phase::first && last_lidar_ && std::abs(to_seconds(t - *last_lidar_)) < lidar_silent) {
+    if (std::exchange(begin_, std::nullopt)) recorder_ = Recorder(reading_);
+    return;
+  }
   if (!begin_ || to_seconds(t - *begin_) < -backwards) begin(t);
   last_ = last_ ? std::max(*last_, t) : t;
   if (const auto* imu = std::get_if<ImuSample>(&measurement)) {
     if (last_imu_) turned_ += imu->gyro.norm() * std::clamp(to_seconds(imu->t - *last_imu_), 0.0, 0.1);
     last_imu_ = imu->t;
   }
-  if (to_seconds(t - *begin_) > dues[due_]) {
-    judge(t);
-    if (over_) return;
-  }
-  recorder_.push(measurement);
+  if (to_seconds(t - *begin_) > due()) judge(t);
+  if (!known_ || sensor != Sensor::lidar) recorder_.push(measurement);
 }
 
 void DescriptionWatch::begin(Time t) {
@@ -105,6 +112,9 @@ void DescriptionWatch::begin(Time t) {
   last_imu_.reset();
 }
 
+// s of this window after which it is judged.
+double DescriptionWatch::due() const { return phase_ == Phase::first ? dues[due_] : phase_ == Phase::open ? open : later; }
+
 bool DescriptionWatch::moved() const { return turned_ > least_turned; }
 
 // One judgement at a time: `live` waits for its turn by going on.
@@ -112,31 +122,60 @@ void DescriptionWatch::judge(Time t) {
   constexpr auto at_once = std::chrono::seconds(0);
   if (future_.valid() && judging_ == Judging::live && future_.wait_for(at_once) != std::future_status::ready) return;
   collect();
-  if (over_) return;
+  if (!known_ && phase_ == Phase::later) {
+    over_ = true;
+    return;
+  }
+  if (known_ && phase_ == Phase::first) {
+    // Here, and not when it was found, which depends on how fast it was judged.
+    phase_ = Phase::later;
+    const bool is_new = *begin_ >= *known_ && !(last_lidar_ && *last_lidar_ > *begin_);
+    if (!is_new) begin(t);
+    if (!is_new || !over_) return;
+  }
   if (first_ || moved()) {
-    auto work = [robot = robot_, recorder = recorder_, t, earlier = std::move(earlier_)]() mutable {
+    auto work = [robot = robot_, recorder = recorder_, begin = *begin_, t, earlier = std::move(earlier_)]() mutable {
       const Recorded recorded = recorder.finish();
       const Diagnosis diagnosis = diagnosis_of(recorded, robot, earlier);
-      return Verdict{diagnosis.findings, diagnosis.settled, std::move(earlier), t};
+      return Verdict{diagnosis.findings, diagnosis.settled, std::move(earlier), begin, t};
     };
     future_ = std::async(judging_ == Judging::here ? std::launch::deferred : std::launch::async, std::move(work));
     if (judging_ == Judging::here) collect();
   }
-  if (++due_ < dues.size()) return;
+  if (phase_ == Phase::first && ++due_ < dues.size()) return;
   first_ = false;
-  if (moved()) ++windows_;
+  if (moved()) {
+    ++windows_;
+    if (phase_ == Phase::open) phase_ = Phase::later;
+    if (phase_ == Phase::first && windows_ >= most_windows) phase_ = Phase::open;
+  }
   begin(t);
+}
+
+// What seems to be wrong may be something else that has changed: no setting corrects it.
+void DescriptionWatch::say_changed(WrongDescription& wrong, Time begin) const {
+  wrong.has_changed = true;
+  wrong.is_mendable = false;
+  wrong.finding.changes.clear();
+  wrong.finding.text = fmt::format("the data fit the description at first, but no longer from {:.0f} s on: {}",
+                                   to_seconds(begin - *origin_), wrong.finding.text);
+  wrong.finding.remedy = "look for what has failed, slipped or been reset by then";
 }
 
 void DescriptionWatch::collect() {
   if (!future_.valid()) return;
   Verdict verdict = future_.get();
-  over_ = verdict.known || windows_ >= most_windows;
   earlier_ = std::move(verdict.earlier);
   for (const Finding& finding : verdict.findings) {
     const auto same = [&finding](const WrongDescription& w) { return w.finding.cause == finding.cause; };
-    if (std::ranges::none_of(found_, same)) found_.push_back(as_wrong(finding, verdict.t, to_seconds(verdict.t - *origin_)));
+    if (std::ranges::any_of(found_, same)) continue;
+    WrongDescription wrong = as_wrong(finding, verdict.t, to_seconds(verdict.t - *origin_));
+    if (good_) say_changed(wrong, verdict.begin);
+    found_.push_back(std::move(wrong));
   }
+  if (!verdict.known || known_) return;
+  known_ = verdict.t;
+  good_ = verdict.findings.empty();
 }
 
 std::vector<WrongDescription> DescriptionWatch::news() {
@@ -151,11 +190,11 @@ std::vector<WrongDescription> DescriptionWatch::finish() {
   const std::lock_guard lock(mutex_);
   collect();
   // A recording that ends before is judged by what there is; a last window that is short tells less than those before it.
-  if (!over_ && last_ && (first_ || to_seconds(*last_ - *begin_) > dues.front())) {
+  if (std::exchange(over_, true)) return found_;
+  if (begin_ && last_ && (first_ || to_seconds(*last_ - *begin_) > dues.front())) {
     judge(*last_);
     collect();
   }
-  over_ = true;
   return found_;
 }
 

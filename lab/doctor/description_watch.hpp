@@ -19,6 +19,7 @@ struct WrongDescription {
   double after = 0;          // s of data
   bool spoils = false;       // results with such a description are worthless, and not only worse
   bool is_mendable = false;  // by settings, and the estimator does not cope with it without them
+  bool has_changed = false;  // the data before showed the description to be right
 };
 
 /// What the finding means for a run.
@@ -35,7 +36,8 @@ class DescriptionWatch {
 
   DescriptionWatch(const Robot& robot, const Reading& reading, Judging judging)
       : robot_(robot), judging_(judging), reading_(reading), recorder_(reading) {}
-  /// Each measurement, in the order of arrival; from any thread. Images are not looked at.
+  /// Each measurement, in the order of arrival; from any thread. Images are not looked at. What the first windows show is judged once; legs
+  /// and IMU alone, which nothing else contradicts, to the end.
   void take(const Measurement& measurement);
   /// What has been found since the last call. Does not wait.
   std::vector<WrongDescription> news();
@@ -47,25 +49,30 @@ class DescriptionWatch {
     std::vector<Finding> findings;
     bool known = false;  // nothing that more data could show was left open
     Earlier earlier;
-    Time t{};
+    Time begin{}, t{};
   };
   void begin(Time t);
   void judge(Time t);
   void collect();
+  void say_changed(WrongDescription& wrong, Time begin) const;
   bool moved() const;
+  double due() const;
 
   Robot robot_;
   Judging judging_;
   Reading reading_;
   std::mutex mutex_;
   Recorder recorder_;
-  std::optional<Time> origin_, begin_, last_;
-  std::size_t due_ = 0;  // index of the next judgement of this window
-  bool over_ = false;    // all is judged
-  bool first_ = true;    // window: judged even when the robot stands, for units and rates
-  int windows_ = 0;      // in which the robot moved
-  Earlier earlier_;      // what the judgement before has shown
-  double turned_ = 0;    // rad, by the gyro in this window
+  std::optional<Time> origin_, begin_, last_, last_lidar_;
+  std::size_t due_ = 0;                                                          // index of the next judgement of this window
+  std::optional<Time> known_;                                                    // all that the first windows could show
+  bool good_ = false;                                                            // by that the description is right
+  enum class Phase : std::uint8_t { first, open, later } phase_ = Phase::first;  // of windows
+  bool over_ = false;                                                            // finish() was called
+  bool first_ = true;  // window: judged even when the robot stands, for units and rates
+  int windows_ = 0;    // in which the robot moved
+  Earlier earlier_;    // what the judgement before has shown
+  double turned_ = 0;  // rad, by the gyro in this window
   std::optional<Time> last_imu_;
   std::future<Verdict> future_;
   std::vector<WrongDescription> found_;

@@ -141,7 +141,8 @@ class Examination {
   void find_on_legs(Finding finding, const LegHypothesis& h);
   // leg_accelerating.cpp
   LegAcceleration leg_acceleration(const LegHypothesis* hypothesis, const SO3& R_link_imu, double offset) const;
-  LegAcceleration leg_acceleration(const std::vector<LegPose>& path, const SO3& R_link_imu, double offset) const;
+  LegAcceleration leg_acceleration(const std::vector<LegPose>& path, const MeasuredForce& force, const SO3& R_link_imu,
+                                   double offset) const;
   bool try_acceleration_hypotheses();
   void examine_leg_size();
   bool accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const;

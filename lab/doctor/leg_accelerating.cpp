@@ -76,24 +76,27 @@ Directions directions_of(const JointTurns& joint) {
 }  // namespace
 
 LegAcceleration Examination::leg_acceleration(const LegHypothesis* hypothesis, const SO3& R_link_imu, double offset) const {
-  return leg_acceleration(legs_under(hypothesis), R_link_imu, offset);
+  return leg_acceleration(legs_under(hypothesis), {mended_imu(), gyro()}, R_link_imu, offset);
 }
 
-LegAcceleration Examination::leg_acceleration(const std::vector<LegPose>& path, const SO3& R_link_imu, double offset) const {
+LegAcceleration Examination::leg_acceleration(const std::vector<LegPose>& path, const MeasuredForce& force, const SO3& R_link_imu,
+                                              double offset) const {
   // The acceleration is not what was measured.
   if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "accel_gravity"; })) return {};
-  return fit_leg_acceleration(path, mended_imu(), gyro(), {R_link_imu, robot_.imu.T_link_imu.p}, offset);
+  return fit_leg_acceleration(path, force, {R_link_imu, robot_.imu.T_link_imu.p}, offset);
 }
 
 // Joints and soles that turn as the gyro does, or hardly turn, may still not accelerate as the robot does. Where soles turn on the ground,
 // and their turning tells nothing, the mount of the IMU and the clock show here as well.
 bool Examination::try_acceleration_hypotheses() {
-  if (!lidar_way().empty()) return false;
   const SO3 R = robot_.imu.T_link_imu.R;
   const auto of_gyro = [](const Finding& f) { return f.cause.starts_with("gyro") || f.cause == "imu_axes"; };
   const bool turning_is_hidden = !legs_.known && legs_.turned && std::ranges::none_of(diagnosis_.findings, of_gyro);
+  // Feet that stand by the LiDAR's way tell more.
+  if (!lidar_way().empty() && (!turning_is_hidden || feet_stand())) return false;
   const std::vector<LegPose> path = legs_under(nullptr);
-  const LegAcceleration described = leg_acceleration(path, R, leg_offset_);
+  const MeasuredForce force(mended_imu(), gyro());
+  const LegAcceleration described = leg_acceleration(path, force, R, leg_offset_);
   constexpr double well = 0.95;  // of the acceleration
   if (described.rows == 0 || described.explained > well) return false;
   struct Candidate {
@@ -131,7 +134,7 @@ bool Examination::try_acceleration_hypotheses() {
   };
   const Candidate* best = nullptr;
   for (Candidate& c : candidates) {
-    c.fit = leg_acceleration(c.legs != nullptr ? legs_under(c.legs) : path, c.R, c.offset);
+    c.fit = leg_acceleration(c.legs != nullptr ? legs_under(c.legs) : path, force, c.R, c.offset);
     constexpr double clearly = 0.9;  // of what the one before leaves, to take its place
     if (is_possible(c) && c.fit.differs() < (best == nullptr ? INFINITY : clearly * best->fit.differs())) best = &c;
   }

@@ -4,25 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "kilvo/math/so3.hpp"
 #include "lab/doctor/robust_fit.hpp"
 
 namespace kilvo::lab {
-namespace {
-
-// s, between the poses of a row: half of the shortest step, in which the body is displaced by a centimetre against uniform motion.
-constexpr double interval = 0.1;
-constexpr std::size_t fewest_rows = 60;  // of three equations each
-constexpr double turn_prior = 1, place_prior = 0.02, bias_prior = 0.15, gyro_prior = 0.01,
-                 clock_prior = 0.05;  // rad, m, m/s^2, rad/s, s
-
-// Unknowns of a row: ratio of the lengths, mount (3), place of the IMU (3), gravity (3), biases of gyro (3) and accelerometer (3), clock of
-// the legs; and the row's right side.
-constexpr int of_turn = 1, of_place = 4, of_gravity = 7, of_gyro = 10, of_bias = 13, of_clock = 16, unknowns = 17;
-using Row = Eigen::Matrix<double, 3, unknowns + 1>;
-using Gram = Eigen::Matrix<double, unknowns + 1, unknowns + 1>;
-
 /// The specific force integrated twice, in the frame of the IMU at the beginning.
 class ForceIntegral {
  public:
@@ -80,6 +67,20 @@ class ForceIntegral {
   }
   std::vector<Step> steps_;
 };
+
+namespace {
+
+// s, between the poses of a row: half of the shortest step, in which the body is displaced by a centimetre against uniform motion.
+constexpr double interval = 0.1;
+constexpr std::size_t fewest_rows = 60;  // of three equations each
+constexpr double turn_prior = 1, place_prior = 0.02, bias_prior = 0.15, gyro_prior = 0.01,
+                 clock_prior = 0.05;  // rad, m, m/s^2, rad/s, s
+
+// Unknowns of a row: ratio of the lengths, mount (3), place of the IMU (3), gravity (3), biases of gyro (3) and accelerometer (3), clock of
+// the legs; and the row's right side.
+constexpr int of_turn = 1, of_place = 4, of_gravity = 7, of_gyro = 10, of_bias = 13, of_clock = 16, unknowns = 17;
+using Row = Eigen::Matrix<double, 3, unknowns + 1>;
+using Gram = Eigen::Matrix<double, unknowns + 1, unknowns + 1>;
 
 Eigen::Vector3d middle_of(const FootPose& foot) {
   Eigen::Vector3d out = Eigen::Vector3d::Zero();
@@ -199,6 +200,7 @@ Solution solve(const Rows& of) {
       lengths.push_back(e.squaredNorm());
       const double weight = 1 / (1 + e.squaredNorm() / (6 * s2));
       out.gram += weight * of.rows[i].transpose() * of.rows[i];
+      if (k + 1 < iterations) continue;
       if (blocks.empty() || of.seconds[i] != of.seconds[i - 1]) blocks.emplace_back();
       blocks.back().H += weight * J.transpose() * J;
       blocks.back().g += weight * J.transpose() * e;
@@ -217,11 +219,14 @@ Solution solve(const Rows& of) {
 
 }  // namespace
 
-LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const std::vector<InertialSample>& imu, const GyroPath& gyro,
-                                     const SE3& T_link_imu, double offset) {
+MeasuredForce::MeasuredForce(const std::vector<InertialSample>& imu, GyroPath turns)
+    : gyro(std::move(turns)), integral(std::make_shared<const ForceIntegral>(imu, gyro)) {}
+
+LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const MeasuredForce& measured, const SE3& T_link_imu,
+                                     double offset) {
   LegAcceleration out;
-  if (imu.size() < 2) return out;
-  const ForceIntegral force(imu, gyro);
+  const ForceIntegral& force = *measured.integral;
+  const GyroPath& gyro = measured.gyro;
   out.offset = offset;
   Solution found;
   // The clock is not linear.

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include "lab/doctor/gyro_path.hpp"
@@ -27,8 +28,17 @@ struct LegAcceleration {
   double differs() const { return good ? 1 + least_scale * (most_scale - 2) : INFINITY; }
 };
 
-/// `path`: both feet in the frame of the link. `imu`: SI units, IMU frame. Starts from `offset` (s).
-LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const std::vector<InertialSample>& imu, const GyroPath& gyro,
-                                     const SE3& T_link_imu, double offset);
+class ForceIntegral;
+
+/// What the accelerometer measured along the turns of the gyro, for any number of fits.
+struct MeasuredForce {
+  /// `imu`: SI units, IMU frame.
+  MeasuredForce(const std::vector<InertialSample>& imu, GyroPath turns);
+  GyroPath gyro;
+  std::shared_ptr<const ForceIntegral> integral;
+};
+
+/// `path`: both feet in the frame of the link. Starts from `offset` (s).
+LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const MeasuredForce& measured, const SE3& T_link_imu, double offset);
 
 }  // namespace kilvo::lab

@@ -50,7 +50,7 @@ LegAcceleration measured(const Walked& walk, double scale, const SO3& turn, doub
   const GyroPath gyro(walk.recorded.imu, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
   SE3 T_link_imu = walk.robot.imu.T_link_imu;
   T_link_imu.R = turn * T_link_imu.R;
-  return fit_leg_acceleration(path, walk.recorded.imu, gyro, T_link_imu, 0);
+  return fit_leg_acceleration(path, MeasuredForce(walk.recorded.imu, gyro), T_link_imu, 0);
 }
 
 const Walked& a_walk() {

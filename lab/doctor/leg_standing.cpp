@@ -91,14 +91,15 @@ bool Examination::try_standing_hypotheses(double longer_than) {
     most = std::max(most, best.standing.worth());
   }
   // What one change explains needs no zero that is a quarter turn off.
-  if (described.worth() < std::max(least_standing, hardly * described.moving) && best.standing.worth() <= as_feet_do * described.moving) {
+  const bool hardly_stands = described.worth() < std::max(least_standing, hardly * described.moving);
+  if (hardly_stands && best.standing.worth() <= as_feet_do * described.moving) {
     gross = gross_leg_hypotheses(recorded_legs_, robot_);
     // Among many that are far off one stands a little by chance, and others nearly as long.
     if (const Longest far = longest_of(gross, longer);
         far.hypothesis != nullptr && far.standing.worth() > std::min(as_feet_do * far.standing.moving, 2 * far.next + least_standing))
       best = far;
   }
-  if (best.hypothesis == nullptr && described.worth() < least_standing) {
+  if (best.hypothesis == nullptr && hardly_stands) {
     sizes = size_hypotheses();
     best = longest_of(sizes, longer);
   }
