@@ -183,6 +183,12 @@ TEST(Doctor, AnAxisOfTheGyroThatIsFrozenOrOfAnotherScaleIsNamed) {
   frozen.sweeps.clear();
   for (InertialSample& s : frozen.imu) s.gyro.setZero();
   EXPECT_THAT(causes(frozen, walked().robot), Contains("gyro_frozen"));
+  // On the way, and without a LiDAR.
+  Recorded failed = walked().recorded;
+  failed.sweeps.clear();
+  const std::size_t half = failed.imu.size() / 2;
+  for (std::size_t k = half; k < failed.imu.size(); ++k) failed.imu[k].gyro.z() = failed.imu[half].gyro.z();
+  EXPECT_THAT(causes(failed, walked().robot), Contains("gyro_frozen"));
 }
 
 TEST(Doctor, AGyroInDegreesIsNamedByTheLidarAlone) {
@@ -310,6 +316,10 @@ TEST(Doctor, JointsThatNeverChangeOrRepeatTheOtherLegAreNamed) {
   Recorded frozen = walked().recorded;
   for (LegSample& s : frozen.legs) s.position.at(left) = frozen.legs.front().position.at(left);
   EXPECT_THAT(causes(frozen, walked().robot), ElementsAre("joint_frozen"));
+  Recorded failed = walked().recorded;
+  const std::size_t half = failed.legs.size() / 2;
+  for (std::size_t k = half; k < failed.legs.size(); ++k) failed.legs[k].position.at(left) = failed.legs[half].position.at(left);
+  EXPECT_THAT(causes(failed, walked().robot), Contains("joint_frozen"));
   Recorded repeated = walked().recorded;
   for (LegSample& s : repeated.legs) s.position.at(left) = s.position.at(right);
   EXPECT_THAT(causes(repeated, walked().robot), ElementsAre("joints_repeated"));

@@ -145,30 +145,36 @@ void Examination::examine_gyro_axes(const Eigen::Vector3d& change, const Eigen::
   if (own_axes) diagnosis_.findings.back().changes = {{"imu.gyro_scale", vector_text(original_.imu.gyro_scale.cwiseProduct(factor))}};
 }
 
-// Noise alone changes each sample of a gyro.
+// Noise alone changes each sample of a gyro. One that fails on the way repeats what it measured last.
 void Examination::examine_frozen_gyro() {
+  const std::vector<InertialSample>& imu = recorded_.imu;
+  if (imu.empty()) return;
+  constexpr double no_chance = 5;  // s, for which a sensor that works does not repeat itself
   std::string axes;
+  std::size_t since = 0;  // sample
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const auto of_axis = [axis](const InertialSample& s) { return s.gyro[axis]; };
-    const auto [least, most] = std::ranges::minmax(recorded_.imu, {}, of_axis);
-    if (of_axis(least) == of_axis(most)) axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[axis]);
+    std::size_t from = imu.size() - 1;
+    while (from > 0 && imu[from - 1].gyro[axis] == imu[from].gyro[axis]) --from;
+    if (from > 0 && imu.back().t - imu[from].t < no_chance) continue;
+    axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[axis]);
+    since = std::max(since, from);
   }
   // A gyro with a dead band may well be silent at rest.
   RunningStatistics acceleration(0, 0, 0, INFINITY);
-  for (const InertialSample& s : recorded_.imu) acceleration.add(s.accel.norm(), 1);
+  for (std::size_t k = since; k < imu.size(); ++k) acceleration.add(imu[k].accel.norm(), 1);
   constexpr double walks = 0.5;  // m/s^2, standard deviation
   const double moved = acceleration.sigma();
   if (axes.empty() || moved < walks) return;
-  find(
-      {Sensor::imu,
-       "gyro_frozen",
-       fmt::format("the gyro never changes about {}", axes),
-       fmt::format("{} samples are the same, while the acceleration has a standard deviation of {:.1f} m/s^2", recorded_.imu.size(), moved),
-       "the driver must publish what the gyro measures",
-       0,
-       "",
-       {},
-       true});
+  find({Sensor::imu,
+        "gyro_frozen",
+        since == 0 ? fmt::format("the gyro never changes about {}", axes)
+                   : fmt::format("the gyro has not changed about {} for the last {:.0f} s", axes, imu.back().t - imu[since].t),
+        fmt::format("{} samples are the same, while the acceleration has a standard deviation of {:.1f} m/s^2", imu.size() - since, moved),
+        "the driver must publish what the gyro measures",
+        0,
+        "",
+        {},
+        true});
 }
 
 }  // namespace kilvo::lab

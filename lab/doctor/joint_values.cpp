@@ -30,6 +30,26 @@ std::vector<Range> ranges_of(const std::vector<LegSample>& legs, std::size_t joi
   return out;
 }
 
+// Of the last seconds in which a joint stood still, those in which the ones of `walking` turned.
+double stuck_for(const std::vector<LegSample>& legs, std::size_t joint, const std::vector<std::size_t>& walking) {
+  if (legs.empty()) return 0;
+  Range still;
+  std::vector<Range> second(walking.size());
+  double end = legs.back().t, stuck = 0;
+  for (auto s = legs.rbegin(); s != legs.rend(); ++s) {
+    if (s->position.size() <= std::max(joint, std::ranges::max(walking))) continue;
+    still = {std::min(still.low, s->position[joint]), std::max(still.high, s->position[joint])};
+    if (still.size() >= at_rest) break;
+    for (std::size_t k = 0; k < walking.size(); ++k)
+      second[k] = {std::min(second[k].low, s->position[walking[k]]), std::max(second[k].high, s->position[walking[k]])};
+    if (end - s->t < 1) continue;
+    if (std::ranges::all_of(second, [](const Range& r) { return r.size() > turns; })) stuck += end - s->t;
+    end = s->t;
+    second.assign(walking.size(), {});
+  }
+  return stuck;
+}
+
 bool same_values(const std::vector<LegSample>& legs, std::size_t a, std::size_t b) {
   return std::ranges::all_of(legs,
                              [&](const LegSample& s) { return s.position.size() <= std::max(a, b) || s.position[a] == s.position[b]; });
@@ -78,21 +98,36 @@ bool Examination::examine_joint_values() {
   const std::vector<Range> ranges = ranges_of(recorded_.legs, recorded_.joint_names.size());
   const std::vector<std::string>& names = recorded_.joint_names;
   const LegSides sides = recorded_legs_.sides(robot_);
-  std::string frozen, repeated;
+  std::string frozen, stuck, repeated;
+  constexpr double no_chance = 5;  // s, for which no joint of a leg that walks stands still
+  // Of the other joints of its leg.
+  const auto busiest_beside = [&](std::size_t i) {
+    std::size_t out = i;
+    for (const std::size_t k : joints) {
+      if (k != i && sides.leg_of_joint(names[k]) == sides.leg_of_joint(names[i]) && (out == i || ranges[k].size() > ranges[out].size()))
+        out = k;
+    }
+    return out;
+  };
   const auto add = [](std::string& to, const std::string& text) { to += (to.empty() ? "" : ", ") + text; };
   for (const std::size_t i : joints) {
     const auto twin = std::ranges::find(names, sides.other_joint(names[i])) - names.begin();
     const auto j = static_cast<std::size_t>(twin);
     if (j == names.size() || j == i || i >= names.size()) continue;
     // The same joint of the other leg walks.
-    if (ranges[i].size() < at_rest && ranges[j].size() > turns) add(frozen, names[i]);
+    if (ranges[i].size() < at_rest && ranges[j].size() > turns) {
+      add(frozen, names[i]);
+    } else if (const double s = stuck_for(recorded_.legs, i, {j, busiest_beside(i)}); s > no_chance) {
+      add(stuck, fmt::format("{} for {:.0f} s", names[i], s));
+    }
     if (i < j && ranges[i].size() > turns && same_values(recorded_.legs, i, j)) add(repeated, names[i] + " and " + names[j]);
   }
   const std::string driver = "the driver must publish each position under its own joint's name";
-  if (!frozen.empty()) {
+  if (!frozen.empty() || !stuck.empty()) {
     find({Sensor::legs,
           "joint_frozen",
-          fmt::format("the positions of {} never change", frozen),
+          stuck.empty() ? fmt::format("the positions of {} never change", frozen)
+                        : fmt::format("the positions have not changed at the end: {}{}{}", stuck, frozen.empty() ? "" : ", never ", frozen),
           "the same joint of the other leg turns",
           driver,
           0,

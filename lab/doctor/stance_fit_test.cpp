@@ -86,6 +86,32 @@ TEST_F(StancesOfAWalk, LastLongestWithTheRightMount) {
   EXPECT_EQ(start.offset, 0);
 }
 
+// Among mounts of which none lets them stand: the fit from the best of them does.
+TEST_F(StancesOfAWalk, TellAMountBetweenThoseThatAreTried) {
+  const SO3 right = robot_.imu.T_link_imu.R;
+  Robot turned = robot_;
+  turned.imu.T_link_imu.R = SO3::Exp({0, 0, 0.8}) * right;
+  const std::vector<SO3> around{SO3::Exp({0, 0.03, 0.1}) * right, SO3::Exp({0, 0.03, -1.5}) * right, SO3::Exp({0, 0, 3}) * right};
+  RecordedLegs legs(recorded_);
+  const LegStart tried = longest_standing(legs, turned, nullptr, way_, gyro_, around);
+  const LegStart fitted = fitted_standing(legs, turned, nullptr, way_, gyro_, around);
+  EXPECT_LT((fitted.R_link_imu * right.inverse()).Log().norm(), 0.004);
+  EXPECT_NEAR(fitted.offset, 0, 0.001);
+  EXPECT_GT(fitted.standing.worth(), 2 * tried.standing.worth());
+  EXPECT_GT(fitted.standing.worth(), 0.5 * fitted.standing.moving);
+}
+
+// A clock that is off by more than the fit may change it by is none that it has found.
+TEST_F(StancesOfAWalk, TellNoClockThatIsFarOff) {
+  for (const double late : {-0.06, 0.06}) {
+    Recorded shifted = recorded_;
+    for (LegSample& s : shifted.legs) s.t += late;
+    RecordedLegs legs(shifted);
+    const StanceFit fit = fit_stances(legs, robot_, nullptr, way_, gyro_, 0);
+    EXPECT_TRUE(!fit.good || std::abs(fit.offset) <= Stances::stance_slack) << fit.offset;
+  }
+}
+
 TEST_F(StancesOfAWalk, LastForMostOfTheWalkAsItIsDescribed) {
   RecordedLegs legs(recorded_);
   const Standing s = standing_time(legs, robot_, nullptr, way_, gyro_, 0);
