@@ -19,17 +19,22 @@ constexpr double clearly = 1.3, least_standing = 2;
 // of the legs: from there the fit of the stances finds both. The turning alone does not tell them on soles that roll.
 bool Examination::find_leg_start() {
   const LidarWay& way = lidar_way();
-  if (way.empty() || (legs_.known && legs_.agrees)) return false;
+  // The turning of a robot that hardly turns agrees at other times as well.
+  if (way.empty() || (legs_.known && legs_.agrees && legs_turned())) return false;
+  const bool stand = feet_stand();
+  if (stand && legs_.known && legs_.agrees) return false;
   const GyroPath path = gyro();
   const LegHypothesis* mend = leg_mend_ ? &*leg_mend_ : nullptr;
   const Standing described = standing_time(recorded_legs_, robot_, mend, way, path, 0);
   constexpr double enough = 0.1;  // of the time in which the robot moves: soles that seem to stand by chance do so for a hundredth of it
-  if (described.worth() > enough * described.moving && feet_stand()) return false;
+  if (stand && described.worth() > enough * described.moving) return false;
+  const double longer = clearly * described.worth() + least_standing;
   LegStart start = longest_standing(recorded_legs_, robot_, mend, way, path, upright_mounts());
-  if (start.standing.worth() < clearly * described.worth() + least_standing) {
+  if (start.standing.worth() < longer) {
     start = fitted_standing(recorded_legs_, robot_, mend, way, path, upright_mounts());
+    // Feet that stand by a fit, and do not as described, need not do so for longer.
+    if (start.standing.worth() < (stand ? longer : std::max(least_standing, described.worth()))) return false;
   }
-  if (start.standing.worth() < clearly * described.worth() + least_standing) return false;
   if (try_standing_hypotheses(start.standing.worth())) return true;
   leg_offset_ = start.offset;
   leg_start_ = start.R_link_imu;
