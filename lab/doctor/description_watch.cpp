@@ -17,9 +17,9 @@ constexpr std::array<double, 2> dues{9, 14};
 constexpr double least_turned = 0.5;  // rad, below which a window tells nothing of mounts and clocks
 constexpr int most_windows = 2;       // of the first ones, in which the robot moved
 // Legs and IMU alone: a long window for what those have left open, then, if they are known, one after the other.
-constexpr double open = 60, later = 30;  // s
-constexpr double backwards = 1;          // s: another recording begins
-constexpr double lidar_silent = 2;       // s, after which nothing contradicts legs and IMU
+constexpr double open_window = 60, later_window = 30;  // s
+constexpr double backwards = 1;                        // s: another recording begins
+constexpr double lidar_silent = 2;                     // s, after which nothing contradicts legs and IMU
 
 // What the estimator finds and corrects by itself, or only becomes less accurate by, is a warning.
 bool spoils(const Finding& finding) {
@@ -87,7 +87,10 @@ void DescriptionWatch::take(const Measurement& measurement) {
   const std::lock_guard lock(mutex_);
   if (over_) return;
   const Time t = stamp_of(measurement);
-  if (sensor == Sensor::lidar) last_lidar_ = t;
+  if (sensor == Sensor::lidar) {
+    last_lidar_ = t;
+    if (phase_ != Phase::first && lidar_is_new_) begin_anew();
+  }
   if (phase_ != Phase::first && last_lidar_ && std::abs(to_seconds(t - *last_lidar_)) < lidar_silent) {
     if (std::exchange(begin_, std::nullopt)) recorder_ = Recorder(reading_);
     return;
@@ -99,7 +102,19 @@ void DescriptionWatch::take(const Measurement& measurement) {
     last_imu_ = imu->t;
   }
   if (to_seconds(t - *begin_) > due()) judge(t);
-  if (!known_ || sensor != Sensor::lidar) recorder_.push(measurement);
+  window_has_lidar_ |= sensor == Sensor::lidar;
+  recorder_.push(measurement);
+}
+
+// A LiDAR that begins late has not been judged.
+void DescriptionWatch::begin_anew() {
+  if (judging_ != Judging::live) collect();
+  begin_.reset();
+  known_.reset();
+  doubts_.clear();
+  phase_ = Phase::first;
+  first_ = true;
+  windows_ = 0;
 }
 
 void DescriptionWatch::begin(Time t) {
@@ -109,13 +124,15 @@ void DescriptionWatch::begin(Time t) {
   // What a window in which the robot moved has left open needs all of another one.
   due_ = windows_ == 0 ? 0 : dues.size() - 1;
   turned_ = 0;
+  window_has_lidar_ = false;
   last_imu_.reset();
 }
 
 // s of this window after which it is judged.
-double DescriptionWatch::due() const { return phase_ == Phase::first ? dues[due_] : phase_ == Phase::open ? open : later; }
+double DescriptionWatch::due() const { return phase_ == Phase::first ? dues[due_] : phase_ == Phase::open ? open_window : later_window; }
 
-bool DescriptionWatch::moved() const { return turned_ > least_turned; }
+// In a long window a bias of the gyro alone adds up to as much.
+bool DescriptionWatch::moved() const { return turned_ > least_turned * std::max(1.0, to_seconds(*last_ - *begin_) / dues.back()); }
 
 // One judgement at a time: `live` waits for its turn by going on.
 void DescriptionWatch::judge(Time t) {
@@ -129,10 +146,12 @@ void DescriptionWatch::judge(Time t) {
   if (known_ && phase_ == Phase::first) {
     // Here, and not when it was found, which depends on how fast it was judged.
     phase_ = Phase::later;
-    const bool is_new = *begin_ >= *known_ && !(last_lidar_ && *last_lidar_ > *begin_);
+    first_ = false;
+    const bool is_new = *begin_ >= *known_ && !window_has_lidar_;
     if (!is_new) begin(t);
     if (!is_new || !over_) return;
   }
+  lidar_is_new_ &= !window_has_lidar_;
   if (first_ || moved()) {
     auto work = [robot = robot_, recorder = recorder_, begin = *begin_, t, earlier = std::move(earlier_)]() mutable {
       const Recorded recorded = recorder.finish();
@@ -153,29 +172,37 @@ void DescriptionWatch::judge(Time t) {
 }
 
 // What seems to be wrong may be something else that has changed: no setting corrects it.
-void DescriptionWatch::say_changed(WrongDescription& wrong, Time begin) const {
+WrongDescription DescriptionWatch::as_changed(WrongDescription wrong, Time begin) const {
   wrong.has_changed = true;
   wrong.is_mendable = false;
   wrong.finding.changes.clear();
-  wrong.finding.text = fmt::format("the data fit the description at first, but no longer from {:.0f} s on: {}",
-                                   to_seconds(begin - *origin_), wrong.finding.text);
-  wrong.finding.remedy = "look for what has failed, slipped or been reset by then";
+  wrong.finding.text =
+      fmt::format("from {:.0f} to {:.0f} s of data, and not before: {}", to_seconds(begin - *origin_), wrong.after, wrong.finding.text);
+  wrong.finding.remedy = "look for what has failed, slipped or been reset in that time";
+  return wrong;
 }
 
 void DescriptionWatch::collect() {
   if (!future_.valid()) return;
   Verdict verdict = future_.get();
   earlier_ = std::move(verdict.earlier);
+  std::vector<Doubt> doubts;
   for (const Finding& finding : verdict.findings) {
-    const auto same = [&finding](const WrongDescription& w) { return w.finding.cause == finding.cause; };
-    if (std::ranges::any_of(found_, same)) continue;
     WrongDescription wrong = as_wrong(finding, verdict.t, to_seconds(verdict.t - *origin_));
-    if (good_) say_changed(wrong, verdict.begin);
-    found_.push_back(std::move(wrong));
+    if (known_) {
+      // A window among many may err: the next one must show it as well, but for sensors that repeat themselves, which none does by chance.
+      const auto before = std::ranges::find(doubts_, finding.cause, &Doubt::cause);
+      doubts.push_back({finding.cause, before != doubts_.end() ? before->begin : verdict.begin});
+      wrong.spoils &= before != doubts_.end() || finding.cause.ends_with("_frozen");
+      wrong = as_changed(std::move(wrong), doubts.back().begin);
+    }
+    const auto same = [&wrong](const WrongDescription& w) {
+      return w.finding.cause == wrong.finding.cause && (w.spoils || !w.has_changed || !wrong.spoils);
+    };
+    if (std::ranges::none_of(found_, same)) found_.push_back(std::move(wrong));
   }
-  if (!verdict.known || known_) return;
-  known_ = verdict.t;
-  good_ = verdict.findings.empty();
+  doubts_ = std::move(doubts);
+  if (verdict.known && !known_) known_ = verdict.t;
 }
 
 std::vector<WrongDescription> DescriptionWatch::news() {

@@ -4,6 +4,7 @@
 #include <future>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "kilvo/sensors/robot.hpp"
@@ -19,7 +20,7 @@ struct WrongDescription {
   double after = 0;          // s of data
   bool spoils = false;       // results with such a description are worthless, and not only worse
   bool is_mendable = false;  // by settings, and the estimator does not cope with it without them
-  bool has_changed = false;  // the data before showed the description to be right
+  bool has_changed = false;  // the data before did not show it, and all that they could show was known
 };
 
 /// What the finding means for a run.
@@ -37,7 +38,7 @@ class DescriptionWatch {
   DescriptionWatch(const Robot& robot, const Reading& reading, Judging judging)
       : robot_(robot), judging_(judging), reading_(reading), recorder_(reading) {}
   /// Each measurement, in the order of arrival; from any thread. Images are not looked at. What the first windows show is judged once; legs
-  /// and IMU alone, which nothing else contradicts, to the end.
+  /// and IMU alone, which nothing else contradicts, to the end: what two windows show that did not show before has changed.
   void take(const Measurement& measurement);
   /// What has been found since the last call. Does not wait.
   std::vector<WrongDescription> news();
@@ -52,9 +53,10 @@ class DescriptionWatch {
     Time begin{}, t{};
   };
   void begin(Time t);
+  void begin_anew();
   void judge(Time t);
   void collect();
-  void say_changed(WrongDescription& wrong, Time begin) const;
+  WrongDescription as_changed(WrongDescription wrong, Time begin) const;
   bool moved() const;
   double due() const;
 
@@ -65,14 +67,20 @@ class DescriptionWatch {
   Recorder recorder_;
   std::optional<Time> origin_, begin_, last_, last_lidar_;
   std::size_t due_ = 0;                                                          // index of the next judgement of this window
-  std::optional<Time> known_;                                                    // all that the first windows could show
-  bool good_ = false;                                                            // by that the description is right
   enum class Phase : std::uint8_t { first, open, later } phase_ = Phase::first;  // of windows
-  bool over_ = false;                                                            // finish() was called
-  bool first_ = true;  // window: judged even when the robot stands, for units and rates
-  int windows_ = 0;    // in which the robot moved
-  Earlier earlier_;    // what the judgement before has shown
-  double turned_ = 0;  // rad, by the gyro in this window
+  std::optional<Time> known_;                                                    // since then: all that data of this kind can show
+  bool window_has_lidar_ = false;                                                // clouds came in this window
+  bool lidar_is_new_ = true;                                                     // no judgement has had clouds
+  struct Doubt {
+    std::string cause;
+    Time begin{};  // of the first of the windows that show it
+  };
+  std::vector<Doubt> doubts_;  // of the last window, when all was known before
+  bool over_ = false;          // no more is judged
+  bool first_ = true;          // window: judged even when the robot stands, for units and rates
+  int windows_ = 0;            // in which the robot moved
+  Earlier earlier_;            // what the judgement before has shown
+  double turned_ = 0;          // rad, by the gyro in this window
   std::optional<Time> last_imu_;
   std::future<Verdict> future_;
   std::vector<WrongDescription> found_;

@@ -175,7 +175,8 @@ Diagnosis Examination::run() {
   const bool open = std::ranges::any_of(diagnosis_.seems_wrong, std::identity());
   // Where no LiDAR's way tells whether the soles stand, their acceleration does.
   const bool accelerated = !lidar_way().empty() || leg_acceleration_.rows > 0;
-  diagnosis_.settled = !open && (recorded_.sweeps.size() < 30 || lidar_.known) && (!legs || (legs_.known && legs_turned() && accelerated));
+  const bool sweeps = recorded_.sweeps.size() >= 30;
+  diagnosis_.settled = !open && (legs || sweeps) && (!sweeps || lidar_.known) && (!legs || (legs_.known && legs_turned() && accelerated));
   return diagnosis_;
 }
 

@@ -319,7 +319,7 @@ TEST(Doctor, JointsThatNeverChangeOrRepeatTheOtherLegAreNamed) {
   Recorded failed = walked().recorded;
   const std::size_t half = failed.legs.size() / 2;
   for (std::size_t k = half; k < failed.legs.size(); ++k) failed.legs[k].position.at(left) = failed.legs[half].position.at(left);
-  EXPECT_THAT(causes(failed, walked().robot), Contains("joint_frozen"));
+  EXPECT_THAT(causes(failed, walked().robot), ElementsAre("joint_frozen"));
   Recorded repeated = walked().recorded;
   for (LegSample& s : repeated.legs) s.position.at(left) = s.position.at(right);
   EXPECT_THAT(causes(repeated, walked().robot), ElementsAre("joints_repeated"));

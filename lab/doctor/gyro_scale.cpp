@@ -145,17 +145,31 @@ void Examination::examine_gyro_axes(const Eigen::Vector3d& change, const Eigen::
   if (own_axes) diagnosis_.findings.back().changes = {{"imu.gyro_scale", vector_text(original_.imu.gyro_scale.cwiseProduct(factor))}};
 }
 
-// Noise alone changes each sample of a gyro. One that fails on the way repeats what it measured last.
+// s, of stepping.
+double Examination::walked_between(double a, double b) const {
+  const Stepping stepping = stepping_of(legs_under(nullptr));
+  return stepping.walks() ? std::max(0.0, std::min(b, stepping.end) - std::max(a, stepping.begin)) : 0;
+}
+
+// Noise alone changes each sample of a gyro. One that fails on the way repeats what it measured last; one with a dead band has repeated
+// itself before.
 void Examination::examine_frozen_gyro() {
   const std::vector<InertialSample>& imu = recorded_.imu;
   if (imu.empty()) return;
-  constexpr double no_chance = 5;  // s, for which a sensor that works does not repeat itself
+  constexpr double no_chance = 5, rest = 0.2;  // s, for which a sensor that works does not repeat itself while the robot walks, or at all
   std::string axes;
   std::size_t since = 0;  // sample
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    std::size_t from = imu.size() - 1;
-    while (from > 0 && imu[from - 1].gyro[axis] == imu[from].gyro[axis]) --from;
-    if (from > 0 && imu.back().t - imu[from].t < no_chance) continue;
+    const std::size_t last = imu.size() - 1;
+    const auto first_of_run = [&](std::size_t from) {
+      while (from > 0 && imu[from - 1].gyro[axis] == imu[from].gyro[axis]) --from;
+      return from;
+    };
+    const std::size_t from = first_of_run(last);
+    bool has_dead_band = false;
+    for (std::size_t k = from; k > 0 && !has_dead_band; k = first_of_run(k - 1))
+      has_dead_band = imu[k - 1].t - imu[first_of_run(k - 1)].t > rest;
+    if (from > 0 && (has_dead_band || walked_between(imu[from].t, imu[last].t) < no_chance)) continue;
     axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[axis]);
     since = std::max(since, from);
   }

@@ -30,22 +30,26 @@ std::vector<Range> ranges_of(const std::vector<LegSample>& legs, std::size_t joi
   return out;
 }
 
-// Of the last seconds in which a joint stood still, those in which the ones of `walking` turned.
-double stuck_for(const std::vector<LegSample>& legs, std::size_t joint, const std::vector<std::size_t>& walking) {
+// Of the last seconds in which a joint stood still, those in which the robot walked and the joints of `walking` turned.
+double seconds_stuck(const std::vector<LegSample>& legs, std::size_t joint, const std::vector<std::size_t>& walking,
+                     const Stepping& stepping) {
   if (legs.empty()) return 0;
   Range still;
-  std::vector<Range> second(walking.size());
+  std::vector<Range> of_second(walking.size());
   double end = legs.back().t, stuck = 0;
   for (auto s = legs.rbegin(); s != legs.rend(); ++s) {
     if (s->position.size() <= std::max(joint, std::ranges::max(walking))) continue;
     still = {std::min(still.low, s->position[joint]), std::max(still.high, s->position[joint])};
     if (still.size() >= at_rest) break;
     for (std::size_t k = 0; k < walking.size(); ++k)
-      second[k] = {std::min(second[k].low, s->position[walking[k]]), std::max(second[k].high, s->position[walking[k]])};
+      of_second[k] = {std::min(of_second[k].low, s->position[walking[k]]), std::max(of_second[k].high, s->position[walking[k]])};
     if (end - s->t < 1) continue;
-    if (std::ranges::all_of(second, [](const Range& r) { return r.size() > turns; })) stuck += end - s->t;
+    constexpr double gap = 1.1;  // s
+    const bool walks =
+        s->t > stepping.begin && end < stepping.end && std::ranges::all_of(of_second, [](const Range& r) { return r.size() > turns; });
+    if (walks && end - s->t < gap) stuck += end - s->t;
     end = s->t;
-    second.assign(walking.size(), {});
+    of_second.assign(walking.size(), {});
   }
   return stuck;
 }
@@ -101,7 +105,7 @@ bool Examination::examine_joint_values() {
   std::string frozen, stuck, repeated;
   constexpr double no_chance = 5;  // s, for which no joint of a leg that walks stands still
   // Of the other joints of its leg.
-  const auto busiest_beside = [&](std::size_t i) {
+  const auto most_moving_beside = [&](std::size_t i) {
     std::size_t out = i;
     for (const std::size_t k : joints) {
       if (k != i && sides.leg_of_joint(names[k]) == sides.leg_of_joint(names[i]) && (out == i || ranges[k].size() > ranges[out].size()))
@@ -117,8 +121,8 @@ bool Examination::examine_joint_values() {
     // The same joint of the other leg walks.
     if (ranges[i].size() < at_rest && ranges[j].size() > turns) {
       add(frozen, names[i]);
-    } else if (const double s = stuck_for(recorded_.legs, i, {j, busiest_beside(i)}); s > no_chance) {
-      add(stuck, fmt::format("{} for {:.0f} s", names[i], s));
+    } else if (const double s = seconds_stuck(recorded_.legs, i, {j, most_moving_beside(i)}, stepping_); s > no_chance) {
+      add(stuck, fmt::format("{} for {:.0f} s of walking", names[i], s));
     }
     if (i < j && ranges[i].size() > turns && same_values(recorded_.legs, i, j)) add(repeated, names[i] + " and " + names[j]);
   }

@@ -197,7 +197,9 @@ void Examination::examine_legs() {
     check(Sensor::legs, "all", Check::Verdict::unknown, "messages of two feet: nothing to hold them against");
     return;
   }
-  if (!examine_leg_names() || !examine_joint_values()) return;
+  if (!examine_leg_names()) return;
+  stepping_ = stepping_of(legs_under(nullptr));
+  if (!examine_joint_values()) return;
   examine_joint_speeds();
   stepping_ = stepping_of(legs_under(nullptr));
   if (!stepping_.walks()) {

@@ -170,6 +170,8 @@ void Examination::examine_leg_clock(const MountFit& fit, double method, double t
     check(Sensor::legs, "clock", fit.explained < 0.6 ? Check::Verdict::unknown : Check::Verdict::good, clock);
     leg_offset_ = 0;
   } else {
+    // What the acceleration has found is known better now.
+    std::erase_if(diagnosis_.findings, [](const Finding& f) { return f.cause == "legs_clock"; });
     find_offset(Sensor::legs, fit.offset, sigma, "the legs against the gyro");
   }
 }

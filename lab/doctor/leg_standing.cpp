@@ -12,6 +12,7 @@ namespace {
 
 // A description stands clearly better than another: factor, and seconds more.
 constexpr double clearly = 1.3, least_standing = 2;
+constexpr double still = 0.002;  // m, robust standard deviation, of soles that stand
 
 }  // namespace
 
@@ -31,9 +32,10 @@ bool Examination::find_leg_start() {
   const double longer = clearly * described.worth() + least_standing;
   LegStart start = longest_standing(recorded_legs_, robot_, mend, way, path, upright_mounts());
   if (start.standing.worth() < longer) {
-    start = fitted_standing(recorded_legs_, robot_, mend, way, path, upright_mounts());
-    // Feet that stand by a fit, and do not as described, need not do so for longer.
-    if (start.standing.worth() < (stand ? longer : std::max(least_standing, described.worth()))) return false;
+    start = fitted_standing(recorded_legs_, robot_, mend, way, path, upright_mounts(), still);
+    // Feet that stand by a fit, and do not as described, need not do so for much longer.
+    const double no_chance = std::max(least_standing, enough * described.moving);
+    if (start.standing.worth() < (stand ? longer : std::max(no_chance, described.worth()))) return false;
   }
   if (try_standing_hypotheses(start.standing.worth())) return true;
   leg_offset_ = start.offset;
@@ -79,7 +81,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
       if (h.culprit != Sensor::legs && (legs_.known || turns_with_link(h))) continue;
       const Standing s = stands(&h);
       if (s.worth() > std::max(most, out.standing.worth()) && s.both() > longer) {
-        out = {&h, s, out.standing.worth()};
+        out = {&h, s, std::max(out.next, out.standing.worth())};
       } else {
         out.next = std::max(out.next, s.worth());
       }
@@ -99,12 +101,15 @@ bool Examination::try_standing_hypotheses(double longer_than) {
   const bool hardly_stands = described.worth() < std::max(least_standing, hardly * described.moving);
   if (hardly_stands && best.standing.worth() <= as_feet_do * described.moving) {
     gross = gross_leg_hypotheses(recorded_legs_, robot_);
-    // Among many that are far off one stands a little by chance, and others nearly as long.
-    if (const Longest far = longest_of(gross, longer);
-        far.hypothesis != nullptr && far.standing.worth() > std::min(as_feet_do * far.standing.moving, 2 * far.next + least_standing))
+    // Among many that are far off one stands a little by chance, and others nearly as long: for a stance of each foot less.
+    constexpr double stances = 1;  // s
+    const Longest far = longest_of(gross, longer);
+    const double next = std::max({far.next, best.standing.worth(), described.worth()});
+    if (far.hypothesis != nullptr && far.standing.worth() > next + stances &&
+        far.standing.worth() > std::min(as_feet_do * far.standing.moving, 2 * next + least_standing))
       best = far;
   }
-  if (best.hypothesis == nullptr && hardly_stands) {
+  if (best.hypothesis == nullptr && described.worth() < least_standing) {
     sizes = size_hypotheses();
     best = longest_of(sizes, longer);
   }
@@ -129,7 +134,7 @@ bool Examination::try_standing_hypotheses(double longer_than) {
 bool Examination::feet_stand() const {
   const LidarWay& way = lidar_way();
   if (way.empty()) return false;
-  constexpr double still = 0.002, near = 0.35;  // m, rad: of a mount; another would not let them stand
+  constexpr double near = 0.35;  // rad, of a mount; another would not let them stand
   Robot start = robot_;
   if (leg_start_) start.imu.T_link_imu.R = *leg_start_;
   const StanceFit fit = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(), leg_offset_);

@@ -40,7 +40,7 @@ StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesi
     fit = robust_fit(rows, none, prior / std::sqrt(stances.repeated()), step, 8, derivative);
     if (!fit.good) return out;
     x = fit.x;
-    // Beyond, the clock changes nothing more.
+    // Stances clamps the clock there: a larger value is no measurement.
     if (std::abs(x[Stances::of_offset]) > Stances::stance_slack) return out;
   }
   out.good = fit.groups > static_cast<std::size_t>(10 * n);
@@ -80,8 +80,16 @@ std::vector<LegStart> longest(Stances& stances, const SO3& described, const std:
   for (int k = -steps; k <= steps; ++k) out.push_back({k * step, described, stances.standing(k * step, described, roughly)});
   for (const SO3& mount : mounts) out.push_back({0, mount, stances.standing(0, mount, roughly)});
   std::ranges::stable_sort(out, std::ranges::greater(), [](const LegStart& s) { return s.standing.worth(); });
-  out.resize(std::min(out.size(), count));
-  return out;
+  // Neighbours lead to the same fit.
+  std::vector<LegStart> apart;
+  for (const LegStart& start : out) {
+    const auto is_near = [&start](const LegStart& s) {
+      constexpr double near = 0.25;  // rad
+      return std::abs(s.offset - start.offset) < 2.5 * step && (s.R_link_imu.inverse() * start.R_link_imu).Log().norm() < near;
+    };
+    if (apart.size() < count && std::ranges::none_of(apart, is_near)) apart.push_back(start);
+  }
+  return apart;
 }
 
 }  // namespace
@@ -93,7 +101,7 @@ LegStart longest_standing(RecordedLegs& legs, const Robot& robot, const LegHypot
 }
 
 LegStart fitted_standing(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
-                         const std::vector<SO3>& mounts, double reach) {
+                         const std::vector<SO3>& mounts, double still, double reach) {
   constexpr std::size_t tried = 4;
   Stances stances(legs, robot, hypothesis, way, gyro, 0, false);
   LegStart best;
@@ -101,7 +109,7 @@ LegStart fitted_standing(RecordedLegs& legs, const Robot& robot, const LegHypoth
     Robot turned = robot;
     turned.imu.T_link_imu.R = start.R_link_imu;
     const StanceFit fit = fit_stances(legs, turned, hypothesis, way, gyro, start.offset);
-    if (!fit.good) continue;
+    if (!fit.good || fit.moved >= still) continue;
     start = {fit.offset, fit.R_link_imu, stances.standing(fit.offset, fit.R_link_imu)};
     if (start.standing.worth() > best.standing.worth()) best = start;
   }

@@ -63,8 +63,8 @@ struct LegStart {
 LegStart longest_standing(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way,
                           const GyroPath& gyro, const std::vector<SO3>& mounts, double reach = 1.3);
 
-/// Likewise, of soles that stand roughly at first, and by the fit that they allow then.
+/// Likewise, of soles that stand roughly at first, and by the fit that they allow then: one after which they move by less than `still` (m).
 LegStart fitted_standing(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
-                         const std::vector<SO3>& mounts, double reach = 1.3);
+                         const std::vector<SO3>& mounts, double still, double reach = 1.3);
 
 }  // namespace kilvo::lab
