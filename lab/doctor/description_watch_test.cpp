@@ -143,5 +143,34 @@ TEST(DescriptionWatch, TakesWhatIsWrongFromTheStartForTheDescription) {
   EXPECT_TRUE(wrong[0].spoils && wrong[0].is_mendable);
 }
 
+TEST(DescriptionWatch, WhatMoreDataRefuteIsAWarningAndChangesNothing) {
+  Finding finding;
+  finding.cause = "lidar_rotation";
+  finding.size = 5;
+  finding.changes = {{"lidar.T_imu_lidar.R", "[1, 0, 0, 0, 1, 0, 0, 0, 1]"}};
+  WrongDescription wrong = as_wrong(finding, {}, 9);
+  ASSERT_TRUE(wrong.spoils && wrong.is_mendable);
+  refute(wrong);
+  EXPECT_FALSE(wrong.spoils || wrong.is_mendable || !wrong.finding.changes.empty());
+  EXPECT_THAT(wrong.finding.remedy, testing::HasSubstr("the description is used as it is"));
+}
+
+// Feet of a runner who slips may never show whether their mount is right.
+TEST(DescriptionWatch, ALiDARIsClearedByMoreDataThoughTheLegsStayUnknown) {
+  Finding finding{Sensor::lidar, "lidar_position", "", "", "", 0.05, "m", {}, true};
+  Diagnosis longer;
+  longer.checks = {{Sensor::lidar, "position of the mount", Check::Verdict::good, ""},
+                   {Sensor::legs, "clock", Check::Verdict::unknown, ""}};
+  EXPECT_TRUE(is_refuted(finding, longer));
+  finding.sensor = Sensor::imu;
+  EXPECT_FALSE(is_refuted(finding, longer));
+  finding.sensor = Sensor::lidar;
+  longer.seems_wrong[index_of(Sensor::lidar)] = true;
+  EXPECT_FALSE(is_refuted(finding, longer));
+  longer.seems_wrong = {};
+  longer.findings = {finding};
+  EXPECT_FALSE(is_refuted(finding, longer));
+}
+
 }  // namespace description_watch_test
 }  // namespace kilvo::lab

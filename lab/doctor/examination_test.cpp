@@ -440,35 +440,6 @@ TEST(DescriptionWatch, DoesNotAccuseAClockThatTheProgramFinds) {
   EXPECT_TRUE(watched(walked().robot, {.leg_clock_is_found = true}, DescriptionWatch::Judging::here, jumps).empty());
 }
 
-TEST(DescriptionWatch, WhatMoreDataRefuteIsAWarningAndChangesNothing) {
-  Finding finding;
-  finding.cause = "lidar_rotation";
-  finding.size = 5;
-  finding.changes = {{"lidar.T_imu_lidar.R", "[1, 0, 0, 0, 1, 0, 0, 0, 1]"}};
-  WrongDescription wrong = as_wrong(finding, {}, 9);
-  ASSERT_TRUE(wrong.spoils && wrong.is_mendable);
-  refute(wrong);
-  EXPECT_FALSE(wrong.spoils || wrong.is_mendable || !wrong.finding.changes.empty());
-  EXPECT_THAT(wrong.finding.remedy, testing::HasSubstr("the description is used as it is"));
-}
-
-// Feet of a runner who slips may never show whether their mount is right.
-TEST(DescriptionWatch, ALiDARIsClearedByMoreDataThoughTheLegsStayUnknown) {
-  Finding finding{Sensor::lidar, "lidar_position", "", "", "", 0.05, "m", {}, true};
-  Diagnosis longer;
-  longer.checks = {{Sensor::lidar, "position of the mount", Check::Verdict::good, ""},
-                   {Sensor::legs, "clock", Check::Verdict::unknown, ""}};
-  EXPECT_TRUE(is_refuted(finding, longer));
-  finding.sensor = Sensor::imu;
-  EXPECT_FALSE(is_refuted(finding, longer));
-  finding.sensor = Sensor::lidar;
-  longer.seems_wrong[index_of(Sensor::lidar)] = true;
-  EXPECT_FALSE(is_refuted(finding, longer));
-  longer.seems_wrong = {};
-  longer.findings = {finding};
-  EXPECT_FALSE(is_refuted(finding, longer));
-}
-
 TEST(Doctor, WhoStandsStillIsNotJudged) {
   Recorded recorded = walked().recorded;
   std::erase_if(recorded.imu, [](const InertialSample& s) { return s.t > 3; });

@@ -144,7 +144,8 @@ bool Examination::try_acceleration_hypotheses() {
   if (then > most || then > much_less * now ||
       smaller_by(then, now, std::min(described.independent, best->fit.independent)) < sure_among(candidates.size())) {
     const bool is_of_legs = best->legs != nullptr ? best->legs->culprit == Sensor::legs : best->offset != leg_offset_;
-    if (then < much_less * now) seems_wrong(is_of_legs ? Sensor::legs : Sensor::imu) = true;
+    // Where the LiDAR knows its way, the legs' way is still to be held against it.
+    if (then < much_less * now && lidar_way().empty()) seems_wrong(is_of_legs ? Sensor::legs : Sensor::imu) = true;
     return false;
   }
   const std::string evidence = fmt::format(

@@ -10,6 +10,7 @@
 #include "lab/doctor/robust_fit.hpp"
 
 namespace kilvo::lab {
+
 /// The specific force integrated twice, in the frame of the IMU at the beginning.
 class ForceIntegral {
  public:
