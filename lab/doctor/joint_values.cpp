@@ -97,7 +97,6 @@ void Examination::examine_locked_joints() {
 
 // False when the legs cannot be judged with these values.
 bool Examination::examine_joint_values() {
-  examine_locked_joints();
   const std::vector<std::size_t> joints = recorded_legs_.joints_that_matter(robot_);
   const std::vector<Range> ranges = ranges_of(recorded_.legs, recorded_.joint_names.size());
   const std::vector<std::string>& names = recorded_.joint_names;

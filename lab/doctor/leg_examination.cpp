@@ -198,10 +198,10 @@ void Examination::examine_legs() {
     return;
   }
   if (!examine_leg_names()) return;
+  examine_locked_joints();
   stepping_ = stepping_of(legs_under(nullptr));
   if (!examine_joint_values()) return;
   examine_joint_speeds();
-  stepping_ = stepping_of(legs_under(nullptr));
   if (!stepping_.walks()) {
     check(Sensor::legs, "mount of the IMU, joints, clock", Check::Verdict::unknown, "the feet do not pass each other often enough: walk");
     return;
