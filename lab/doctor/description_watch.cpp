@@ -16,7 +16,7 @@ namespace {
 constexpr std::array<double, 2> dues{9, 14};
 constexpr double least_turned = 0.5;  // rad, below which a window tells nothing of mounts and clocks
 constexpr int most_windows = 2;       // of the first ones, in which the robot moved
-// Legs and IMU alone: a long window for what those have left open, then, if they are known, one after the other.
+// Legs and IMU alone: those and what follows as one long window for what they have left open, then, if that is known, one after the other.
 constexpr double open_window = 60, later_window = 30;  // s
 constexpr double backwards = 1;                        // s: another recording begins
 constexpr double lidar_silent = 2;                     // s, after which nothing contradicts legs and IMU
@@ -92,24 +92,30 @@ void DescriptionWatch::take(const Measurement& measurement) {
     if (phase_ != Phase::first && lidar_is_new_) begin_anew();
   }
   if (phase_ != Phase::first && last_lidar_ && std::abs(to_seconds(t - *last_lidar_)) < lidar_silent) {
-    if (std::exchange(begin_, std::nullopt)) recorder_ = Recorder(reading_);
+    if (std::exchange(now_.begin, std::nullopt)) now_.recorder = Recorder(reading_);
     return;
   }
-  if (!begin_ || to_seconds(t - *begin_) < -backwards) begin(t);
+  const bool is_another = now_.begin && to_seconds(t - *now_.begin) < -backwards;
+  if (is_another) whole_.begin.reset();
+  if (!now_.begin || is_another) begin(t);
   last_ = last_ ? std::max(*last_, t) : t;
   if (const auto* imu = std::get_if<ImuSample>(&measurement)) {
-    if (last_imu_) turned_ += imu->gyro.norm() * std::clamp(to_seconds(imu->t - *last_imu_), 0.0, 0.1);
+    const double turned = last_imu_ ? imu->gyro.norm() * std::clamp(to_seconds(imu->t - *last_imu_), 0.0, 0.1) : 0;
+    now_.turned += turned;
+    whole_.turned += turned;
     last_imu_ = imu->t;
   }
-  if (to_seconds(t - *begin_) > due()) judge(t);
+  if (to_seconds(t - *now_.begin) > due()) judge(t);
   window_has_lidar_ |= sensor == Sensor::lidar;
-  recorder_.push(measurement);
+  now_.recorder.push(measurement);
+  if (last_lidar_ || known_ || phase_ != Phase::first) whole_.begin.reset();
+  if (whole_.begin) whole_.recorder.push(measurement);
 }
 
 // A LiDAR that begins late has not been judged.
 void DescriptionWatch::begin_anew() {
   if (judging_ != Judging::live) collect();
-  begin_.reset();
+  now_.begin.reset();
   known_.reset();
   doubts_.clear();
   phase_ = Phase::first;
@@ -118,21 +124,27 @@ void DescriptionWatch::begin_anew() {
 }
 
 void DescriptionWatch::begin(Time t) {
-  begin_ = last_ = t;
+  last_ = t;
   if (!origin_) origin_ = t;
-  recorder_ = Recorder(reading_);
+  now_ = {Recorder(reading_), t};
+  if (windows_ == 0) whole_ = now_;
   // What a window in which the robot moved has left open needs all of another one.
   due_ = windows_ == 0 ? 0 : dues.size() - 1;
-  turned_ = 0;
   window_has_lidar_ = false;
   last_imu_.reset();
+}
+
+// What the windows before have left open, with what follows.
+void DescriptionWatch::continue_whole() {
+  if (whole_.begin) now_ = std::move(whole_);
+  whole_ = {Recorder(reading_), {}};
 }
 
 // s of this window after which it is judged.
 double DescriptionWatch::due() const { return phase_ == Phase::first ? dues[due_] : phase_ == Phase::open ? open_window : later_window; }
 
 // In a long window a bias of the gyro alone adds up to as much.
-bool DescriptionWatch::moved() const { return turned_ > least_turned * std::max(1.0, to_seconds(*last_ - *begin_) / dues.back()); }
+bool DescriptionWatch::moved() const { return now_.turned > least_turned * std::max(1.0, to_seconds(*last_ - *now_.begin) / dues.back()); }
 
 // One judgement at a time: `live` waits for its turn by going on.
 void DescriptionWatch::judge(Time t) {
@@ -147,13 +159,13 @@ void DescriptionWatch::judge(Time t) {
     // Here, and not when it was found, which depends on how fast it was judged.
     phase_ = Phase::later;
     first_ = false;
-    const bool is_new = *begin_ >= *known_ && !window_has_lidar_;
+    const bool is_new = *now_.begin >= *known_ && !window_has_lidar_;
     if (!is_new) begin(t);
     if (!is_new || !over_) return;
   }
   lidar_is_new_ &= !window_has_lidar_;
   if (first_ || moved()) {
-    auto work = [robot = robot_, recorder = recorder_, begin = *begin_, t, earlier = std::move(earlier_)]() mutable {
+    auto work = [robot = robot_, recorder = now_.recorder, begin = *now_.begin, t, earlier = std::move(earlier_)]() mutable {
       const Recorded recorded = recorder.finish();
       const Diagnosis diagnosis = diagnosis_of(recorded, robot, earlier);
       return Verdict{diagnosis.findings, diagnosis.settled, std::move(earlier), begin, t};
@@ -163,12 +175,16 @@ void DescriptionWatch::judge(Time t) {
   }
   if (phase_ == Phase::first && ++due_ < dues.size()) return;
   first_ = false;
+  bool is_open = false;
   if (moved()) {
     ++windows_;
+    is_open = phase_ == Phase::first && windows_ >= most_windows;
     if (phase_ == Phase::open) phase_ = Phase::later;
-    if (phase_ == Phase::first && windows_ >= most_windows) phase_ = Phase::open;
   }
   begin(t);
+  if (!is_open) return;
+  phase_ = Phase::open;
+  continue_whole();
 }
 
 // What seems to be wrong may be something else that has changed: no setting corrects it.
@@ -218,7 +234,8 @@ std::vector<WrongDescription> DescriptionWatch::finish() {
   collect();
   // A recording that ends before is judged by what there is; a last window that is short tells less than those before it.
   if (std::exchange(over_, true)) return found_;
-  if (begin_ && last_ && (first_ || to_seconds(*last_ - *begin_) > dues.front())) {
+  if (now_.begin && !known_ && phase_ == Phase::first && windows_ > 0) continue_whole();
+  if (now_.begin && last_ && (first_ || to_seconds(*last_ - *now_.begin) > dues.front())) {
     judge(*last_);
     collect();
   }

@@ -36,7 +36,7 @@ class DescriptionWatch {
   enum class Judging : std::uint8_t { here, beside, live };
 
   DescriptionWatch(const Robot& robot, const Reading& reading, Judging judging)
-      : robot_(robot), judging_(judging), reading_(reading), recorder_(reading) {}
+      : robot_(robot), judging_(judging), reading_(reading), now_{Recorder(reading), {}}, whole_{Recorder(reading), {}} {}
   /// Each measurement, in the order of arrival; from any thread. Images are not looked at. What the first windows show is judged once; legs
   /// and IMU alone, which nothing else contradicts, to the end: what two windows show that did not show before has changed.
   void take(const Measurement& measurement);
@@ -54,18 +54,26 @@ class DescriptionWatch {
   };
   void begin(Time t);
   void begin_anew();
+  void continue_whole();
   void judge(Time t);
   void collect();
   WrongDescription as_changed(WrongDescription wrong, Time begin) const;
   bool moved() const;
   double due() const;
 
+  struct Window {
+    Recorder recorder;
+    std::optional<Time> begin;
+    double turned = 0;  // rad, by the gyro
+  };
+
   Robot robot_;
   Judging judging_;
   Reading reading_;
   std::mutex mutex_;
-  Recorder recorder_;
-  std::optional<Time> origin_, begin_, last_, last_lidar_;
+  Window now_;
+  Window whole_;  // since the robot moves, all that came without a LiDAR: what single windows leave open, both may show
+  std::optional<Time> origin_, last_, last_lidar_;
   std::size_t due_ = 0;                                                          // index of the next judgement of this window
   enum class Phase : std::uint8_t { first, open, later } phase_ = Phase::first;  // of windows
   std::optional<Time> known_;                                                    // since then: all that data of this kind can show
@@ -80,7 +88,6 @@ class DescriptionWatch {
   bool first_ = true;          // window: judged even when the robot stands, for units and rates
   int windows_ = 0;            // in which the robot moved
   Earlier earlier_;            // what the judgement before has shown
-  double turned_ = 0;          // rad, by the gyro in this window
   std::optional<Time> last_imu_;
   std::future<Verdict> future_;
   std::vector<WrongDescription> found_;

@@ -133,6 +133,37 @@ TEST(DescriptionWatch, JudgesLegsThatBeginLate) {
   EXPECT_EQ(wrong[0].finding.cause, "joint_sign");
 }
 
+// Soles that turn on soft ground hide how the legs turn.
+void turn_soles(Measurement& m, double t) {
+  auto* legs = std::get_if<JointSample>(&m);
+  if (legs == nullptr) return;
+  for (std::size_t i = 0; i < legs->names.size(); ++i) {
+    if (legs->names[i].find("ankle") != std::string::npos) legs->position[i] += 0.06 * std::sin(12 * t + static_cast<double>(i));
+  }
+}
+
+// A window of 14 s shows no mount to 12 degrees on such ground, and a minute one to 8.
+TEST(DescriptionWatch, JudgesAllThatTheFirstWindowsHaveLeftOpen) {
+  struct Case {
+    double turn, until, after;  // degrees, s, s
+  };
+  for (const Case& c : {Case{12, 26, 26}, Case{8, 70, 60}}) {
+    const Eigen::Matrix3d R = SO3::Exp(c.turn * M_PI / 180 * Eigen::Vector3d(0.3, 0.3, 0.9).normalized()).matrix();
+    const auto turned = [&R](Measurement& m, double t) {
+      turn_soles(m, t);
+      auto* imu = std::get_if<ImuSample>(&m);
+      if (imu != nullptr) imu->gyro = R * imu->gyro, imu->accel = R * imu->accel;
+    };
+    const std::vector<WrongDescription> wrong = watched(DescriptionWatch::Judging::here, turned, c.until);
+    ASSERT_EQ(wrong.size(), 1U) << c.turn;
+    EXPECT_EQ(wrong[0].finding.cause, "imu_mount_rotation");
+    EXPECT_NEAR(wrong[0].finding.size, c.turn, 4);
+    EXPECT_NEAR(wrong[0].after, c.after, 0.1);
+    EXPECT_FALSE(wrong[0].has_changed);
+  }
+  EXPECT_THAT(watched(DescriptionWatch::Judging::here, turn_soles), IsEmpty());
+}
+
 // From the first window on it is the description that is wrong.
 TEST(DescriptionWatch, TakesWhatIsWrongFromTheStartForTheDescription) {
   const std::vector<WrongDescription> wrong =
