@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "kilvo/sensors/robot.hpp"
 #include "lab/doctor/camera_fit.hpp"
@@ -145,6 +146,10 @@ class Examination {
   LegAcceleration leg_acceleration(const std::vector<LegPose>& path, const MeasuredForce& force, const SO3& R_link_imu,
                                    double offset) const;
   bool try_acceleration_hypotheses();
+  std::pair<SO3, LegAcceleration> accelerated_mount(const std::vector<LegPose>& path, const MeasuredForce& force, SO3 R,
+                                                    LegAcceleration fit) const;
+  bool find_accelerated_mount(const std::vector<LegPose>& path, const MeasuredForce& force, const LegAcceleration& described);
+  bool acceleration_contradicts_legs(const std::string& evidence);
   void examine_leg_size();
   bool accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const;
   bool examine_leg_shape();

@@ -82,6 +82,7 @@ constexpr double turn_prior = 1, place_prior = 0.02, bias_prior = 0.15, gyro_pri
 constexpr int of_turn = 1, of_place = 4, of_gravity = 7, of_gyro = 10, of_bias = 13, of_clock = 16, unknowns = 17;
 using Row = Eigen::Matrix<double, 3, unknowns + 1>;
 using Gram = Eigen::Matrix<double, unknowns + 1, unknowns + 1>;
+using Columns = Eigen::Matrix<double, unknowns + 1, Eigen::Dynamic>;  // rows, transposed
 
 Eigen::Vector3d middle_of(const FootPose& foot) {
   Eigen::Vector3d out = Eigen::Vector3d::Zero();
@@ -144,12 +145,31 @@ Row row_of(const std::array<const Moment*, 3>& at, const ForceIntegral& force, c
 
 /// Of times at which one foot is the lower one all along.
 struct Rows {
-  std::vector<Row> rows;
-  std::vector<int> seconds;
+  Columns columns;           // three of each row
+  std::vector<int> seconds;  // by row
+  double noise = 0;          // m^2, of a row's right side
+  Eigen::Index size() const { return static_cast<Eigen::Index>(seconds.size()); }
 };
+
+// What rough encoders and stamps give each pose for itself, which in a second difference is the same over any interval; of the motion
+// hardly anything is left from one pose to the next.
+double noise_of(const std::vector<Moment>& moments) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 1; i + 1 < moments.size(); ++i) {
+    const std::array at{&moments[i - 1], &moments[i], &moments[i + 1]};
+    const double before = at[1]->t - at[0]->t, after = at[2]->t - at[1]->t;
+    if (before > 2 * after || after > 2 * before) continue;  // a gap
+    const std::size_t foot = at[1]->lower;
+    sum += bend(at, [foot](const Moment& m) { return m.sole[foot]; }).squaredNorm();
+    ++count;
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
 
 Rows rows_of(const std::vector<Moment>& moments, const ForceIntegral& force, const Eigen::Vector3d& p_LI) {
   Rows out;
+  std::vector<Row> rows;
   double last = -1e9;
   std::size_t changed = 0, a = 0;  // where the lower foot became the lower one; a row's first moment
   for (std::size_t c = 1; c < moments.size(); ++c) {
@@ -165,15 +185,19 @@ Rows rows_of(const std::vector<Moment>& moments, const ForceIntegral& force, con
     for (double t = moments[a].t; t <= moments[c].t; t += 0.25 * interval) is_borne = is_borne && force.is_borne(t);
     if (!is_borne) continue;
     last = b->t;
-    out.rows.push_back(row_of({&moments[a], &*b, &moments[c]}, force, p_LI));
+    rows.push_back(row_of({&moments[a], &*b, &moments[c]}, force, p_LI));
     out.seconds.push_back(static_cast<int>(b->t));
   }
+  out.columns.resize(Eigen::NoChange, 3 * out.size());
+  for (Eigen::Index i = 0; i < out.size(); ++i) out.columns.middleCols<3>(3 * i) = rows[static_cast<std::size_t>(i)].transpose();
+  out.noise = noise_of(moments);
   return out;
 }
 
 struct Solution {
   Eigen::Matrix<double, unknowns, 1> x = Eigen::Matrix<double, unknowns, 1>::Zero();
-  Gram gram;  // weighted, with the prior
+  Gram gram;           // weighted, with the prior
+  double weights = 0;  // sum over the rows
   Eigen::Matrix<double, unknowns, unknowns> cov;
 };
 
@@ -189,27 +213,37 @@ Solution solve(const Rows& of) {
     Eigen::Matrix<double, unknowns, unknowns> H = Eigen::Matrix<double, unknowns, unknowns>::Zero();
     Eigen::Matrix<double, unknowns, 1> g = Eigen::Matrix<double, unknowns, 1>::Zero();
   };
+  const auto J = of.columns.topRows<unknowns>();
   Solution out;
+  Columns weighted(unknowns + 1, of.columns.cols());
+  Eigen::RowVectorXd e(of.columns.cols());
+  std::vector<double> lengths(of.seconds.size());
   double s2 = 1e-5;  // m^2: of a sole that rolls
   for (int k = 0; k < iterations; ++k) {
-    std::vector<Block> blocks;
-    std::vector<double> lengths;
-    out.gram.setZero();
-    for (std::size_t i = 0; i < of.rows.size(); ++i) {
-      const auto J = of.rows[i].leftCols<unknowns>();
-      const Eigen::Vector3d e = of.rows[i].col(unknowns) - J * out.x;
-      lengths.push_back(e.squaredNorm());
-      const double weight = 1 / (1 + e.squaredNorm() / (6 * s2));
-      out.gram += weight * of.rows[i].transpose() * of.rows[i];
-      if (k + 1 < iterations) continue;
-      if (blocks.empty() || of.seconds[i] != of.seconds[i - 1]) blocks.emplace_back();
-      blocks.back().H += weight * J.transpose() * J;
-      blocks.back().g += weight * J.transpose() * e;
+    e = of.columns.row(unknowns);
+    e.noalias() -= out.x.transpose() * J;
+    out.weights = 0;
+    for (Eigen::Index i = 0; i < of.size(); ++i) {
+      const double length = e.segment<3>(3 * i).squaredNorm(), weight = 1 / (1 + length / (6 * s2));
+      lengths[static_cast<std::size_t>(i)] = length;
+      weighted.middleCols<3>(3 * i) = weight * of.columns.middleCols<3>(3 * i);
+      out.weights += weight;
     }
+    out.gram.noalias() = weighted * of.columns.transpose();
     out.gram.diagonal().head<unknowns>() += s2 * prior;
     const Eigen::Matrix<double, unknowns, unknowns> H = out.gram.topLeftCorner<unknowns, unknowns>();
     out.x = H.ldlt().solve(out.gram.topRightCorner<unknowns, 1>());
-    if (k + 1 == iterations) out.cov = jackknife(blocks, H);
+    if (k + 1 == iterations) {
+      std::vector<Block> blocks;
+      for (Eigen::Index i = 0; i < of.size(); ++i) {
+        const auto n = static_cast<std::size_t>(i);
+        if (blocks.empty() || of.seconds[n] != of.seconds[n - 1]) blocks.emplace_back();
+        const auto rows = weighted.middleCols<3>(3 * i).topRows<unknowns>();
+        blocks.back().H += rows.lazyProduct(J.middleCols<3>(3 * i).transpose());
+        blocks.back().g += rows * e.segment<3>(3 * i).transpose();
+      }
+      out.cov = jackknife(blocks, H);
+    }
     const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
     std::ranges::nth_element(lengths, middle);
     constexpr double median_of_three = 2.366;  // of chi-square
@@ -230,14 +264,16 @@ LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const Mea
   const GyroPath& gyro = measured.gyro;
   out.offset = offset;
   Solution found;
+  double noise = 0;
   // The clock is not linear.
   constexpr int rounds = 3;
   for (int k = 0; k < rounds; ++k) {
     const std::vector<Moment> moments = moments_of(path, force, gyro, T_link_imu.R.inverse(), out.offset);
     const Rows rows = rows_of(moments, force, T_link_imu.p);
-    out.rows = rows.rows.size() < fewest_rows ? 0 : rows.rows.size();
+    out.rows = rows.seconds.size() < fewest_rows ? 0 : rows.seconds.size();
     if (out.rows == 0) return out;
     found = solve(rows);
+    noise = rows.noise;
     constexpr double most = 0.05;  // s
     if (k + 1 < rounds) out.offset += std::clamp(found.x[of_clock], -most, most);
   }
@@ -253,7 +289,9 @@ LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const Mea
   rest << found.gram(0, 0), found.gram(0, unknowns), found.gram(unknowns, 0), found.gram(unknowns, unknowns);
   rest -= both.transpose() * H.ldlt().solve(both);
   const double together = rest(0, 1);
-  if (!(rest(0, 0) > 0 && rest(1, 1) > 0 && together > 0) || !found.x.allFinite()) return out;
+  if (!(rest(0, 0) > 0 && rest(1, 1) > 0) || !found.x.allFinite()) return out;
+  out.contradicts = (rest(0, 0) - 2 * together + rest(1, 1) - noise * found.weights) / rest(0, 0);
+  if (!(together > 0)) return out;
   out.good = true;
   out.least_scale = together / rest(0, 0);
   out.most_scale = rest(1, 1) / together;

@@ -23,9 +23,13 @@ struct LegAcceleration {
   Eigen::Vector3d turn, sigma;          // rad, frame of the link: true mount of the link on the IMU = described * Exp(turn)
   std::size_t rows = 0;                 // 0: too few
   double independent = 0;               // values in them that do not depend on each other
+  double contradicts = 0;               // as differs(), good or not, without the noise of encoders and stamps: legs that do not move: 1
   /// Squared difference of the two accelerations by the accelerometer's squared, with legs of the described size: small only where both
   /// belong together and the size is right.
   double differs() const { return good ? 1 + least_scale * (most_scale - 2) : INFINITY; }
+  /// rad: by what soles that roll turn the mount. On 34 right walks of levels 0 to 2 it was turned by 1.2 times as much (rms), at most
+  /// by 2.6.
+  double mount_method() const { return 0.0087 + 0.175 * (1 - explained); }
 };
 
 class ForceIntegral;

@@ -2,7 +2,9 @@
 #include "lab/doctor/leg_acceleration.hpp"
 
 #include <cmath>
+#include <functional>
 #include <gtest/gtest.h>
+#include <random>
 
 #include "lab/doctor/examination.hpp"
 #include "lab/settings/settings.hpp"
@@ -36,10 +38,14 @@ Walked walked(const std::string& name, double from, double to) {
   return out;
 }
 
+std::vector<LegPose> path_of(const Walked& walk) {
+  RecordedLegs legs(walk.recorded);
+  return legs.path(walk.robot, nullptr, pose_period, nullptr);
+}
+
 /// As Examination asks for it, with what is wrong.
 LegAcceleration measured(const Walked& walk, double scale, const SO3& turn, double late) {
-  RecordedLegs legs(walk.recorded);
-  std::vector<LegPose> path = legs.path(walk.robot, nullptr, pose_period, nullptr);
+  std::vector<LegPose> path = path_of(walk);
   const Eigen::Vector3d p = walk.robot.imu.T_link_imu.p;
   for (LegPose& pose : path) {
     pose.t += late;
@@ -131,6 +137,32 @@ TEST(LegAcceleration, DiffersLeastAsItIs) {
   EXPECT_EQ(LegAcceleration{}.differs(), INFINITY);
 }
 
+// Encoders that are rough make them differ as well.
+TEST(LegAcceleration, IsContradictedByLegsThatMoveOtherwiseAndNotByNoise) {
+  const Walked& walk = a_walk();
+  const auto with = [&walk](const std::function<void(Eigen::Vector3d&)>& change) {
+    std::vector<LegPose> path = path_of(walk);
+    for (LegPose& pose : path) {
+      for (FootPose& foot : pose.foot) {
+        const Eigen::Vector3d corner = foot.p[0];
+        Eigen::Vector3d moved = corner;
+        change(moved);
+        for (Eigen::Vector3d& p : foot.p) p += moved - corner;
+      }
+    }
+    const GyroPath gyro(walk.recorded.imu, Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
+    return fit_leg_acceleration(path, MeasuredForce(walk.recorded.imu, gyro), walk.robot.imu.T_link_imu, 0);
+  };
+  EXPECT_LT(with([](Eigen::Vector3d&) {}).contradicts, 0.1);
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0, 0.006);  // m
+  const LegAcceleration rough = with([&](Eigen::Vector3d& p) { p += Eigen::Vector3d(noise(random), noise(random), noise(random)); });
+  EXPECT_GT(rough.differs(), 1);
+  EXPECT_LT(rough.contradicts, 0.5);
+  const LegAcceleration backwards = with([](Eigen::Vector3d& p) { p = {-p.x(), -p.y(), p.z()}; });
+  EXPECT_GT(backwards.contradicts, 1.5);
+}
+
 /// On soft ground soles turn under the robot: ankles that turn by 3 degrees twice a second.
 Walked on_turning_soles() {
   Walked walk = walked("room", 0, 24);
@@ -161,6 +193,28 @@ TEST(LegAcceleration, OnSolesThatTurnShowsWhatTheirTurningHides) {
   ASSERT_FALSE(by_clock.findings.empty());
   EXPECT_EQ(by_clock.findings.front().cause, "legs_clock");
   EXPECT_NEAR(by_clock.findings.front().size, -0.3, 0.03);
+}
+
+TEST(LegAcceleration, OnSolesThatTurnShowsAnyMount) {
+  const Walked right = on_turning_soles();
+  for (const Eigen::Vector3d& axis : {Eigen::Vector3d(0, 0, 45), Eigen::Vector3d(30, -20, 0), Eigen::Vector3d(60, 40, 80)}) {
+    Walked turned = right;
+    const SO3 turn = SO3::Exp(axis * M_PI / 180);
+    turned.robot.imu.T_link_imu.R = turn * right.robot.imu.T_link_imu.R;
+    const Diagnosis diagnosis = of_legs_and_imu(turned);
+    ASSERT_FALSE(diagnosis.findings.empty()) << axis.transpose();
+    EXPECT_EQ(diagnosis.findings.front().cause, "imu_mount_rotation");
+    EXPECT_NEAR(diagnosis.findings.front().size, degrees(turn.Log().norm()), 6);
+  }
+}
+
+// The joints of another walk: none of the changes that are tried makes them those of this one.
+TEST(LegAcceleration, OfLegsThatMoveOtherwiseContradicts) {
+  Walked walk = walked("room", 3, 24);
+  walk.recorded.legs = walked("fast_walk", 3, 24).recorded.legs;
+  const Diagnosis diagnosis = of_legs_and_imu(walk);
+  ASSERT_FALSE(diagnosis.findings.empty());
+  EXPECT_EQ(diagnosis.findings.front().cause, "leg_joints") << diagnosis.findings.front().text;
 }
 
 }  // namespace leg_acceleration_test

@@ -216,7 +216,7 @@ void Examination::examine_legs() {
   }
   if (!legs_.known && !feet_stand()) {
     const std::string turning = fmt::format("{:.0f} % of the legs' turning is that of the gyro at best", 100 * legs_.explained);
-    if (way_contradicts_legs(turning)) return;
+    if (way_contradicts_legs(turning) || acceleration_contradicts_legs(turning)) return;
     const std::string detail = turning + ": no walk, or slow or rough encoders";
     check(Sensor::legs, "mount of the IMU, joints, clock", Check::Verdict::unknown, detail);
     return;

@@ -129,7 +129,7 @@ void Examination::examine_leg_rotation() {
   } else if (accelerates) {
     adopt(start.imu.T_link_imu.R.inverse() * SO3::Exp(leg_acceleration_.turn), leg_acceleration_.sigma, leg_acceleration_.offset,
           leg_acceleration_.offset_sigma, fit);
-    method = 0.5 + 10 * (1 - leg_acceleration_.explained);
+    method = degrees(leg_acceleration_.mount_method());
     clock_method = 0.001 + 0.04 * (1 - leg_acceleration_.explained);
   }
   leg_offset_ = fit.offset;
