@@ -16,7 +16,7 @@ namespace {
 constexpr std::array<double, 2> dues{9, 14};
 constexpr double least_turned = 0.5;  // rad, below which a window tells nothing of mounts and clocks
 constexpr int most_windows = 2;       // of the first ones, in which the robot moved
-// Legs and IMU alone: those and what follows as one long window for what they have left open, then, if that is known, one after the other.
+// Legs and IMU alone: a minute from the first of those on for what they have left open, then, if that is known, one after the other.
 constexpr double open_window = 60, later_window = 30;  // s
 constexpr double backwards = 1;                        // s: another recording begins
 constexpr double lidar_silent = 2;                     // s, after which nothing contradicts legs and IMU
@@ -96,19 +96,20 @@ void DescriptionWatch::take(const Measurement& measurement) {
     return;
   }
   const bool is_another = now_.begin && to_seconds(t - *now_.begin) < -backwards;
-  if (is_another) whole_.begin.reset();
+  if (is_another) whole_ = {Recorder(reading_), {}};
   if (!now_.begin || is_another) begin(t);
   last_ = last_ ? std::max(*last_, t) : t;
   if (const auto* imu = std::get_if<ImuSample>(&measurement)) {
-    const double turned = last_imu_ ? imu->gyro.norm() * std::clamp(to_seconds(imu->t - *last_imu_), 0.0, 0.1) : 0;
-    now_.turned += turned;
-    whole_.turned += turned;
+    if (last_imu_) turned_ += imu->gyro.norm() * std::clamp(to_seconds(imu->t - *last_imu_), 0.0, 0.1);
     last_imu_ = imu->t;
   }
-  if (to_seconds(t - *now_.begin) > due()) judge(t);
+  const Window& longest = phase_ == Phase::open && whole_.begin ? whole_ : now_;
+  if (to_seconds(t - *longest.begin) > due()) judge(t);
   window_has_lidar_ |= sensor == Sensor::lidar;
   now_.recorder.push(measurement);
-  if (last_lidar_ || known_ || phase_ != Phase::first) whole_.begin.reset();
+  // A robot that stands for long after it has moved shows nothing more, and would fill the memory.
+  const bool is_too_long = whole_.begin && to_seconds(t - *whole_.begin) > open_window;
+  if (whole_.begin && (last_lidar_ || phase_ == Phase::later || is_too_long)) whole_ = {Recorder(reading_), {}};
   if (whole_.begin) whole_.recorder.push(measurement);
 }
 
@@ -128,23 +129,21 @@ void DescriptionWatch::begin(Time t) {
   if (!origin_) origin_ = t;
   now_ = {Recorder(reading_), t};
   if (windows_ == 0) whole_ = now_;
+  turned_ = 0;
   // What a window in which the robot moved has left open needs all of another one.
   due_ = windows_ == 0 ? 0 : dues.size() - 1;
   window_has_lidar_ = false;
   last_imu_.reset();
 }
 
-// What the windows before have left open, with what follows.
-void DescriptionWatch::continue_whole() {
-  if (whole_.begin) now_ = std::move(whole_);
-  whole_ = {Recorder(reading_), {}};
-}
+// What single windows have left open is judged by all of them.
+bool DescriptionWatch::needs_whole() const { return whole_.begin && !known_ && windows_ > 0 && (phase_ == Phase::open || over_); }
 
 // s of this window after which it is judged.
 double DescriptionWatch::due() const { return phase_ == Phase::first ? dues[due_] : phase_ == Phase::open ? open_window : later_window; }
 
 // In a long window a bias of the gyro alone adds up to as much.
-bool DescriptionWatch::moved() const { return now_.turned > least_turned * std::max(1.0, to_seconds(*last_ - *now_.begin) / dues.back()); }
+bool DescriptionWatch::moved() const { return turned_ > least_turned * std::max(1.0, to_seconds(*last_ - *now_.begin) / dues.back()); }
 
 // One judgement at a time: `live` waits for its turn by going on.
 void DescriptionWatch::judge(Time t) {
@@ -164,7 +163,12 @@ void DescriptionWatch::judge(Time t) {
     if (!is_new || !over_) return;
   }
   lidar_is_new_ &= !window_has_lidar_;
-  if (first_ || moved()) {
+  bool has_moved = moved();
+  if (needs_whole()) {
+    now_ = std::exchange(whole_, {Recorder(reading_), {}});
+    has_moved = true;  // in a window before
+  }
+  if (first_ || has_moved) {
     auto work = [robot = robot_, recorder = now_.recorder, begin = *now_.begin, t, earlier = std::move(earlier_)]() mutable {
       const Recorded recorded = recorder.finish();
       const Diagnosis diagnosis = diagnosis_of(recorded, robot, earlier);
@@ -175,16 +179,12 @@ void DescriptionWatch::judge(Time t) {
   }
   if (phase_ == Phase::first && ++due_ < dues.size()) return;
   first_ = false;
-  bool is_open = false;
-  if (moved()) {
+  if (has_moved) {
     ++windows_;
-    is_open = phase_ == Phase::first && windows_ >= most_windows;
     if (phase_ == Phase::open) phase_ = Phase::later;
+    if (phase_ == Phase::first && windows_ >= most_windows) phase_ = Phase::open;
   }
   begin(t);
-  if (!is_open) return;
-  phase_ = Phase::open;
-  continue_whole();
 }
 
 // What seems to be wrong may be something else that has changed: no setting corrects it.
@@ -234,8 +234,7 @@ std::vector<WrongDescription> DescriptionWatch::finish() {
   collect();
   // A recording that ends before is judged by what there is; a last window that is short tells less than those before it.
   if (std::exchange(over_, true)) return found_;
-  if (now_.begin && !known_ && phase_ == Phase::first && windows_ > 0) continue_whole();
-  if (now_.begin && last_ && (first_ || to_seconds(*last_ - *now_.begin) > dues.front())) {
+  if (now_.begin && last_ && (first_ || needs_whole() || to_seconds(*last_ - *now_.begin) > dues.front())) {
     judge(*last_);
     collect();
   }

@@ -54,7 +54,7 @@ class DescriptionWatch {
   };
   void begin(Time t);
   void begin_anew();
-  void continue_whole();
+  bool needs_whole() const;
   void judge(Time t);
   void collect();
   WrongDescription as_changed(WrongDescription wrong, Time begin) const;
@@ -64,7 +64,6 @@ class DescriptionWatch {
   struct Window {
     Recorder recorder;
     std::optional<Time> begin;
-    double turned = 0;  // rad, by the gyro
   };
 
   Robot robot_;
@@ -72,7 +71,7 @@ class DescriptionWatch {
   Reading reading_;
   std::mutex mutex_;
   Window now_;
-  Window whole_;  // since the robot moves, all that came without a LiDAR: what single windows leave open, both may show
+  Window whole_;  // all since the first window in which the robot moved began, while no LiDAR has come
   std::optional<Time> origin_, last_, last_lidar_;
   std::size_t due_ = 0;                                                          // index of the next judgement of this window
   enum class Phase : std::uint8_t { first, open, later } phase_ = Phase::first;  // of windows
@@ -88,6 +87,7 @@ class DescriptionWatch {
   bool first_ = true;          // window: judged even when the robot stands, for units and rates
   int windows_ = 0;            // in which the robot moved
   Earlier earlier_;            // what the judgement before has shown
+  double turned_ = 0;          // rad, by the gyro in this window
   std::optional<Time> last_imu_;
   std::future<Verdict> future_;
   std::vector<WrongDescription> found_;

@@ -120,7 +120,9 @@ bool Examination::try_acceleration_hypotheses() {
     constexpr std::size_t every = 3;  // of 36
     const std::vector<SO3> mounts = upright_mounts();
     for (std::size_t k = 0; k < mounts.size(); k += every) candidates.push_back({nullptr, mounts[k], leg_offset_, {}});
-    for (int k = -steps; k <= steps && !recorded_.reading.leg_clock_is_found; ++k) candidates.push_back({nullptr, R, k * step, {}});
+    for (int k = -steps; k <= steps && !recorded_.reading.leg_clock_is_found; ++k) {
+      if (k * step != leg_offset_) candidates.push_back({nullptr, R, k * step, {}});
+    }
   }
   const auto is_possible = [&](const Candidate& c) {
     // Many are tried: one that needs another mount besides fits by chance; soles that roll seem to turn the robot by 0.16.
@@ -172,11 +174,12 @@ bool Examination::try_acceleration_hypotheses() {
 std::pair<SO3, LegAcceleration> Examination::accelerated_mount(const std::vector<LegPose>& path, const MeasuredForce& force, SO3 R,
                                                                LegAcceleration fit) const {
   constexpr int steps = 4;
-  constexpr double better = 0.97;  // of what differs
+  constexpr double better = 0.97, not_worse = 1.03;  // of what differs
   for (int k = 0; k < steps && fit.good; ++k) {
     const SO3 next = SO3::Exp(-fit.turn) * R;
     const LegAcceleration then = leg_acceleration(path, force, next, leg_offset_);
-    if (!then.good || then.differs() > better * fit.differs()) break;
+    const bool comes_nearer = then.turn.norm() < 0.5 * fit.turn.norm();
+    if (!then.good || then.differs() > (comes_nearer ? not_worse : better) * fit.differs()) break;
     R = next;
     fit = then;
   }
@@ -187,23 +190,29 @@ std::pair<SO3, LegAcceleration> Examination::accelerated_mount(const std::vector
 bool Examination::find_accelerated_mount(const std::vector<LegPose>& path, const MeasuredForce& force, const LegAcceleration& described) {
   const auto [R, fit] = accelerated_mount(path, force, robot_.imu.T_link_imu.R, described);
   constexpr double most = 0.8;  // differs: right ones on 34 walks by up to 0.74
-  if (!fit.good || fit.differs() > most) return false;
+  if (!fit.good || fit.differs() > most || sure * fit.scale_sigma >= fit.least_scale) return false;
+  const double sigma = std::hypot(fit.mount_method(), fit.sigma.norm());
+  const double turn = (R * robot_.imu.T_link_imu.R.inverse()).Log().norm();
+  if (turn < sure * sigma || fit.turn.norm() > 0.5 * sure * sigma) return false;
   const SO3 mount = SO3::Exp(-fit.turn) * R;
-  const double turn = (mount * robot_.imu.T_link_imu.R.inverse()).Log().norm(), sigma = std::hypot(fit.mount_method(), fit.sigma.norm());
-  if (turn < sure * sigma) return false;
   find_turned_imu(mount, fmt::format("by the acceleration of the legs over standing soles by {:.1f} degrees, standard deviation {:.1f}",
                                      degrees(turn), degrees(sigma)));
   return true;
 }
 
-// Legs that neither turn nor stand as the robot does may be of use all the same, where soles roll on soil: their acceleration then differs
-// from the accelerometer's by less than that of legs that do not move would.
+// Legs whose turning and standing tell nothing may be right, on soft ground: then their acceleration differs from the accelerometer's by
+// less than that of legs that do not move would. Legs that step in the air move a robot that hangs, or is carried, by nothing.
 bool Examination::acceleration_contradicts_legs(const std::string& evidence) {
-  if (seems_wrong(Sensor::legs) || seems_wrong(Sensor::imu)) return false;
+  const auto is_explained = [](const Finding& f) { return f.sensor != Sensor::lidar && !f.cause.ends_with("_rate"); };
+  if (seems_wrong(Sensor::legs) || seems_wrong(Sensor::imu) || std::ranges::any_of(diagnosis_.findings, is_explained)) return false;
+  if (!legs_.turned || recorded_.reading.leg_clock_is_found) return false;
   if (tilt_under(robot_.imu.T_link_imu.R, false).value_or(0) > most_tilt) return false;
   const LegAcceleration fit = leg_acceleration(nullptr, robot_.imu.T_link_imu.R, leg_offset_);
-  constexpr double of_right_ones = 0.7, of_none = 1;  // on 34 right walks of levels 0 to 2 up to 0.68
-  if (fit.rows == 0 || fit.contradicts < of_none || smaller_by(of_right_ones, fit.contradicts, fit.independent) < sure) return false;
+  constexpr double of_right_ones = 0.8, of_none = 1;  // on 34 right walks of levels 0 to 2 up to 0.68
+  constexpr double of_a_walk = 0.5;                   // m/s^2, rms
+  if (fit.rows == 0 || fit.acceleration < of_a_walk || fit.contradicts < of_none ||
+      smaller_by(of_right_ones + fit.noise, fit.contradicts + fit.noise, fit.independent) < sure)
+    return false;
   accuse_leg_joints(
       fmt::format("{}; their acceleration over standing soles differs from the accelerometer's by {:.2f} of its square, that "
                   "of legs that do not move by 1",

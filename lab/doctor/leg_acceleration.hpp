@@ -23,7 +23,9 @@ struct LegAcceleration {
   Eigen::Vector3d turn, sigma;          // rad, frame of the link: true mount of the link on the IMU = described * Exp(turn)
   std::size_t rows = 0;                 // 0: too few
   double independent = 0;               // values in them that do not depend on each other
-  double contradicts = 0;               // as differs(), good or not, without the noise of encoders and stamps: legs that do not move: 1
+  double acceleration = 0;              // m/s^2: rms of the accelerometer's
+  double noise = 0;                     // share of the accelerometer's square that the noise of encoders and stamps has in what differs
+  double contradicts = 0;               // as differs(), good or not, without that noise; of legs that neither move nor turn 1
   /// Squared difference of the two accelerations by the accelerometer's squared, with legs of the described size: small only where both
   /// belong together and the size is right.
   double differs() const { return good ? 1 + least_scale * (most_scale - 2) : INFINITY; }

@@ -158,7 +158,9 @@ TEST(LegAcceleration, IsContradictedByLegsThatMoveOtherwiseAndNotByNoise) {
   std::normal_distribution<double> noise(0, 0.006);  // m
   const LegAcceleration rough = with([&](Eigen::Vector3d& p) { p += Eigen::Vector3d(noise(random), noise(random), noise(random)); });
   EXPECT_GT(rough.differs(), 1);
-  EXPECT_LT(rough.contradicts, 0.5);
+  // Rows that differ by much have less weight, so that less of the noise is in it than is taken off.
+  EXPECT_LT(rough.contradicts, 0.1);
+  EXPECT_GT(rough.contradicts, -0.4 * rough.noise);
   const LegAcceleration backwards = with([](Eigen::Vector3d& p) { p = {-p.x(), -p.y(), p.z()}; });
   EXPECT_GT(backwards.contradicts, 1.5);
 }
@@ -202,7 +204,7 @@ TEST(LegAcceleration, OnSolesThatTurnShowsAnyMount) {
     const SO3 turn = SO3::Exp(axis * M_PI / 180);
     turned.robot.imu.T_link_imu.R = turn * right.robot.imu.T_link_imu.R;
     const Diagnosis diagnosis = of_legs_and_imu(turned);
-    ASSERT_FALSE(diagnosis.findings.empty()) << axis.transpose();
+    ASSERT_EQ(diagnosis.findings.size(), 1U) << axis.transpose();
     EXPECT_EQ(diagnosis.findings.front().cause, "imu_mount_rotation");
     EXPECT_NEAR(diagnosis.findings.front().size, degrees(turn.Log().norm()), 6);
   }
@@ -215,6 +217,16 @@ TEST(LegAcceleration, OfLegsThatMoveOtherwiseContradicts) {
   const Diagnosis diagnosis = of_legs_and_imu(walk);
   ASSERT_FALSE(diagnosis.findings.empty());
   EXPECT_EQ(diagnosis.findings.front().cause, "leg_joints") << diagnosis.findings.front().text;
+}
+
+// A robot that steps while it hangs from a crane shows nothing of its legs.
+TEST(LegAcceleration, OfLegsThatStepInTheAirIsNotJudged) {
+  Walked walk = walked("room", 3, 24);
+  for (InertialSample& s : walk.recorded.imu) {
+    s.gyro = {0.02 * std::sin(s.t), 0.05 * std::sin(1.3 * s.t), 0.03};
+    s.accel = walk.robot.imu.T_link_imu.R.inverse() * Eigen::Vector3d(0.3 * std::sin(1.5 * s.t), 0.02 * std::sin(90 * s.t), 9.81);
+  }
+  EXPECT_TRUE(of_legs_and_imu(walk).good());
 }
 
 }  // namespace leg_acceleration_test
