@@ -146,16 +146,17 @@ class Examination {
   LegAcceleration leg_acceleration(const std::vector<LegPose>& path, const MeasuredForce& force, const SO3& R_link_imu,
                                    double offset) const;
   bool try_acceleration_hypotheses();
-  std::pair<SO3, LegAcceleration> accelerated_mount(const std::vector<LegPose>& path, const MeasuredForce& force, SO3 R,
-                                                    LegAcceleration fit) const;
-  bool find_accelerated_mount(const std::vector<LegPose>& path, const MeasuredForce& force, const LegAcceleration& described);
-  bool acceleration_contradicts_legs(const std::string& evidence);
   void examine_leg_size();
   bool accelerates_as_it_turns(const MountFit& by_turning, const SO3& R_link_imu) const;
   bool examine_leg_shape();
   void examine_joint_speeds();
   /// Positions that are wrong contradict their velocities: one finding, and what mends it does without those.
   void settle_joint_speeds();
+  // accelerated_mount.cpp
+  std::pair<SO3, LegAcceleration> accelerated_mount(const std::vector<LegPose>& path, const MeasuredForce& force, SO3 R,
+                                                    LegAcceleration fit) const;
+  bool find_accelerated_mount(const std::vector<LegPose>& path, const MeasuredForce& force, const LegAcceleration& described);
+  bool acceleration_contradicts_legs(const std::string& evidence);
   // leg_mount.cpp, leg_zeros.cpp
   MountFit measure_leg_mount() const;
   void examine_leg_rotation();
