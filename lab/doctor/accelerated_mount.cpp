@@ -7,7 +7,7 @@
 
 namespace kilvo::lab {
 
-// The mount to which this one leads: by a mount that is off the wrong foot seems to be the lower one.
+// The mount to which fits from this one lead, and its fit: by a mount that is off the wrong foot seems to be the lower one.
 std::pair<SO3, LegAcceleration> Examination::accelerated_mount(const std::vector<LegPose>& path, const MeasuredForce& force, SO3 R,
                                                                LegAcceleration fit) const {
   constexpr int steps = 4;
@@ -31,14 +31,13 @@ bool Examination::find_accelerated_mount(const std::vector<LegPose>& path, const
   const double sigma = std::hypot(fit.mount_method(), fit.sigma.norm());
   const double turn = (R * robot_.imu.T_link_imu.R.inverse()).Log().norm();
   if (turn < sure * sigma || fit.turn.norm() > 0.5 * sure * sigma) return false;
-  const SO3 mount = SO3::Exp(-fit.turn) * R;
-  find_turned_imu(mount, fmt::format("by the acceleration of the legs over standing soles by {:.1f} degrees, standard deviation {:.1f}",
-                                     degrees(turn), degrees(sigma)));
+  find_turned_imu(R, fmt::format("by the acceleration of the legs over standing soles by {:.1f} degrees, standard deviation {:.1f}",
+                                 degrees(turn), degrees(sigma)));
   return true;
 }
 
 // Legs whose turning and standing tell nothing may be right, on soft ground: then their acceleration differs from the accelerometer's by
-// less than that of legs that do not move would. Legs that step in the air move a robot that hangs, or is carried, by nothing.
+// less than that of legs that do not move would. A robot that hangs, or is carried, is not moved by legs that step in the air.
 bool Examination::acceleration_contradicts_legs(const std::string& evidence) {
   const auto is_explained = [](const Finding& f) { return f.sensor != Sensor::lidar && !f.cause.ends_with("_rate"); };
   if (seems_wrong(Sensor::legs) || seems_wrong(Sensor::imu) || std::ranges::any_of(diagnosis_.findings, is_explained)) return false;

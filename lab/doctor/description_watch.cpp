@@ -92,11 +92,11 @@ void DescriptionWatch::take(const Measurement& measurement) {
     if (phase_ != Phase::first && lidar_is_new_) begin_anew();
   }
   if (phase_ != Phase::first && last_lidar_ && std::abs(to_seconds(t - *last_lidar_)) < lidar_silent) {
-    if (std::exchange(now_.begin, std::nullopt)) now_.recorder = Recorder(reading_);
+    if (now_.begin) now_ = empty();
     return;
   }
   const bool is_another = now_.begin && to_seconds(t - *now_.begin) < -backwards;
-  if (is_another) whole_ = {Recorder(reading_), {}};
+  if (is_another) whole_ = empty();
   if (!now_.begin || is_another) begin(t);
   last_ = last_ ? std::max(*last_, t) : t;
   if (const auto* imu = std::get_if<ImuSample>(&measurement)) {
@@ -109,7 +109,7 @@ void DescriptionWatch::take(const Measurement& measurement) {
   now_.recorder.push(measurement);
   // A robot that stands for long after it has moved shows nothing more, and would fill the memory.
   const bool is_too_long = whole_.begin && to_seconds(t - *whole_.begin) > open_window;
-  if (whole_.begin && (last_lidar_ || phase_ == Phase::later || is_too_long)) whole_ = {Recorder(reading_), {}};
+  if (whole_.begin && (last_lidar_ || phase_ == Phase::later || is_too_long)) whole_ = empty();
   if (whole_.begin) whole_.recorder.push(measurement);
 }
 
@@ -165,7 +165,7 @@ void DescriptionWatch::judge(Time t) {
   lidar_is_new_ &= !window_has_lidar_;
   bool has_moved = moved();
   if (needs_whole()) {
-    now_ = std::exchange(whole_, {Recorder(reading_), {}});
+    now_ = std::exchange(whole_, empty());
     has_moved = true;  // in a window before
   }
   if (first_ || has_moved) {

@@ -36,7 +36,7 @@ class DescriptionWatch {
   enum class Judging : std::uint8_t { here, beside, live };
 
   DescriptionWatch(const Robot& robot, const Reading& reading, Judging judging)
-      : robot_(robot), judging_(judging), reading_(reading), now_{Recorder(reading), {}}, whole_{Recorder(reading), {}} {}
+      : robot_(robot), judging_(judging), reading_(reading), now_(empty()), whole_(empty()) {}
   /// Each measurement, in the order of arrival; from any thread. Images are not looked at. What the first windows show is judged once; legs
   /// and IMU alone, which nothing else contradicts, to the end: what two windows show that did not show before has changed.
   void take(const Measurement& measurement);
@@ -65,6 +65,7 @@ class DescriptionWatch {
     Recorder recorder;
     std::optional<Time> begin;
   };
+  Window empty() const { return {Recorder(reading_), {}}; }
 
   Robot robot_;
   Judging judging_;

@@ -89,7 +89,6 @@ Row row_of(const std::array<const Moment*, 3>& at, const ForceIntegral& force, c
 struct Rows {
   Columns columns;           // three of each row
   std::vector<int> seconds;  // by row
-  double noise = 0;          // m^2, of a row's right side
   Eigen::Index size() const { return static_cast<Eigen::Index>(seconds.size()); }
 };
 
@@ -132,7 +131,6 @@ Rows rows_of(const std::vector<Moment>& moments, const ForceIntegral& force, con
   }
   out.columns.resize(Eigen::NoChange, 3 * out.size());
   for (Eigen::Index i = 0; i < out.size(); ++i) out.columns.middleCols<3>(3 * i) = rows[static_cast<std::size_t>(i)].transpose();
-  out.noise = noise_of(moments);
   return out;
 }
 
@@ -206,7 +204,7 @@ LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const Mea
   const GyroPath& gyro = measured.gyro;
   out.offset = offset;
   Solution found;
-  double noise = 0;
+  double noise = 0;  // m^2, of a row's right side
   // The clock is not linear.
   constexpr int rounds = 3;
   for (int k = 0; k < rounds; ++k) {
@@ -215,9 +213,12 @@ LegAcceleration fit_leg_acceleration(const std::vector<LegPose>& path, const Mea
     out.rows = rows.seconds.size() < fewest_rows ? 0 : rows.seconds.size();
     if (out.rows == 0) return out;
     found = solve(rows);
-    noise = rows.noise;
     constexpr double most = 0.05;  // s
-    if (k + 1 < rounds) out.offset += std::clamp(found.x[of_clock], -most, most);
+    if (k + 1 < rounds) {
+      out.offset += std::clamp(found.x[of_clock], -most, most);
+    } else {
+      noise = noise_of(moments);
+    }
   }
   // A row is of two intervals, and the next one begins half of one later.
   constexpr double overlap = 4;
