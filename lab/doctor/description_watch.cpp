@@ -32,7 +32,7 @@ bool spoils(const Finding& finding) {
                                                     "lidar_range",    "clouds_deskewed"};
   constexpr double lidar_turn = 3, imu_turn = 10, time = 0.08, length = 0.2, place = 0.05;  // degrees, s, -, m
   if (std::ranges::find(always, finding.cause) != always.end()) return true;
-  if (finding.cause == "accel_unit") return finding.fatal;
+  if (finding.cause == "accel_unit" || finding.cause == "joints_jump") return finding.fatal;
   if (finding.cause == "lidar_position") return finding.size > place;
   if (finding.cause == "lidar_rotation") return finding.size > lidar_turn;
   if (finding.cause == "imu_mount_rotation") return finding.size > imu_turn;

@@ -161,6 +161,50 @@ TEST(DescriptionWatch, FindsAMountOnSolesThatTurn) {
   EXPECT_THAT(watched(DescriptionWatch::Judging::here, turn_soles), IsEmpty());
 }
 
+// The zeros of a joint_state_publisher between the robot's own messages.
+TEST(DescriptionWatch, FindsASecondPublisherOfTheJoints) {
+  const auto with_zeros = [](std::size_t every) {
+    DescriptionWatch watch(walked().robot, {}, DescriptionWatch::Judging::here);
+    std::size_t messages = 0;
+    for (const Measurement& measurement : walked().measurements) {
+      if (to_seconds(stamp_of(measurement) - walked().start) > 10) break;
+      watch.take(measurement);
+      const auto* legs = std::get_if<JointSample>(&measurement);
+      if (legs == nullptr || ++messages % every != 0) continue;
+      JointSample zeros = *legs;
+      zeros.t += std::chrono::microseconds(200);
+      std::ranges::fill(zeros.position, 0);
+      watch.take(zeros);
+    }
+    return watch.finish();
+  };
+  const std::vector<WrongDescription> often = with_zeros(20), seldom = with_zeros(500);
+  ASSERT_EQ(often.size(), 1U);
+  EXPECT_EQ(often[0].finding.cause, "joints_jump");
+  EXPECT_NEAR(often[0].finding.size, 1 / 21.0, 0.01);
+  EXPECT_TRUE(often[0].spoils);
+  ASSERT_EQ(seldom.size(), 1U);
+  EXPECT_EQ(seldom[0].finding.cause, "joints_jump");
+  EXPECT_FALSE(seldom[0].spoils || seldom[0].is_mendable);
+}
+
+// Stamps that jump back by more than a second are those of another recording.
+TEST(DescriptionWatch, BeginsAnewWhereStampsJumpBack) {
+  DescriptionWatch watch(walked().robot, {}, DescriptionWatch::Judging::here);
+  for (const double earlier : {0.0, 1000.0}) {
+    for (Measurement measurement : walked().measurements) {
+      if (to_seconds(stamp_of(measurement) - walked().start) > 40) break;
+      std::visit([&](auto& m) { m.t -= from_seconds(earlier); }, measurement);
+      if (earlier > 0) turn_knee_round(measurement, failure + 1);
+      watch.take(measurement);
+    }
+    if (earlier == 0) { EXPECT_THAT(watch.news(), IsEmpty()); }
+  }
+  const std::vector<WrongDescription> wrong = watch.finish();
+  ASSERT_FALSE(wrong.empty());
+  EXPECT_EQ(wrong[0].finding.cause, "joint_sign");
+}
+
 // From the first window on it is the description that is wrong.
 TEST(DescriptionWatch, TakesWhatIsWrongFromTheStartForTheDescription) {
   const std::vector<WrongDescription> wrong =

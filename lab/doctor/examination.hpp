@@ -120,6 +120,7 @@ class Examination {
   bool examine_leg_names();
   void examine_length_units();
   bool examine_joint_values();
+  bool joints_jump();
   void examine_locked_joints();
   /// Legs that hardly turn show how they bend, not how they are mounted.
   bool legs_turned() const;

@@ -95,8 +95,28 @@ void Examination::examine_locked_joints() {
         true});
 }
 
+// A second publisher on the topic (the zeros of a joint_state_publisher, a simulation beside the robot), or an encoder that fails.
+bool Examination::joints_jump() {
+  constexpr std::size_t fewest = 10;
+  constexpr double rare = 1e-3, few = 0.01;  // of the messages; with a few the legs can be judged all the same
+  const JointReturns& returns = recorded_.joint_returns;
+  const double share = static_cast<double>(returns.count) / std::max(1.0, static_cast<double>(returns.messages));
+  if (returns.count < fewest || share < rare) return false;
+  find({Sensor::legs,
+        "joints_jump",
+        fmt::format("joints jump and are back in the next message: {} of {} messages", returns.count, returns.messages),
+        fmt::format("{} by up to {:.2f} rad", returns.joint, returns.largest),
+        "only the robot's encoders may publish on the topic of the joints: look for another publisher (joint_state_publisher, a simulation)",
+        share,
+        "of the messages",
+        {},
+        share > few});
+  return share > few;
+}
+
 // False when the legs cannot be judged with these values.
 bool Examination::examine_joint_values() {
+  if (joints_jump()) return false;
   const std::vector<std::size_t> joints = recorded_legs_.joints_that_matter(robot_);
   const std::vector<Range> ranges = ranges_of(recorded_.legs, recorded_.joint_names.size());
   const std::vector<std::string>& names = recorded_.joint_names;

@@ -39,15 +39,35 @@ void Recorder::take(const ImuSample& sample) {
   if (sample.gyro.allFinite() && sample.accel.allFinite()) recorded_.imu.push_back({seconds(sample.t), sample.gyro, sample.accel});
 }
 
+void Recorder::count_return(double t, const std::vector<double>& positions) {
+  constexpr double at_once = 0.03, jump = 0.1;  // s, rad: a joint that oscillates so has 2000 rad/s^2 and more
+  JointReturns& returns = recorded_.joint_returns;
+  ++returns.messages;
+  auto& [first, middle] = before_;
+  const bool comparable = first.position.size() == positions.size() && middle.position.size() == positions.size();
+  bool returned = false;
+  for (std::size_t i = 0; comparable && std::abs(t - first.t) < at_once && i < positions.size(); ++i) {
+    const double there = middle.position[i] - first.position[i], back = positions[i] - middle.position[i];
+    const double size = std::min(std::abs(there), std::abs(back));
+    if (size < jump || std::abs(there + back) > 0.25 * size) continue;
+    returned = true;
+    if (size < returns.largest) continue;
+    returns.largest = size;
+    returns.joint = i < recorded_.joint_names.size() ? recorded_.joint_names[i] : "";
+  }
+  returns.count += returned ? 1 : 0;
+  std::swap(first, middle);
+  middle.t = t;
+  middle.position = positions;
+}
+
 void Recorder::take(const JointSample& sample) {
   const double t = seconds(sample.t);
+  if (sample.names.list() == recorded_.joint_names) count_return(t, sample.position);
   if (t - last_leg_ < leg_period && (t >= last_leg_ || (recorded_.reading.leg_clock_is_found && t > last_leg_ - leg_step))) return;
   if (!std::ranges::all_of(sample.position, [](double q) { return std::isfinite(q); })) return;
   if (recorded_.joint_names.empty()) recorded_.joint_names = sample.names;
-  if (sample.names.list() != recorded_.joint_names) {
-    recorded_.joint_names_change = true;
-    return;
-  }
+  if (sample.names.list() != recorded_.joint_names) return;
   // Before a clock is found, or once another one is, the stamps are off by something else: only what follows can be judged.
   if (recorded_.reading.leg_clock_is_found && std::abs(t - last_leg_ - leg_period) > leg_step) recorded_.legs.clear();
   last_leg_ = t;

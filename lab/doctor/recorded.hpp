@@ -36,6 +36,14 @@ struct LegSample {
   std::vector<double> velocity;  // may be empty
 };
 
+/// Messages that joints jump to, to come back in the next one, faster than any joint turns: readings of something else.
+struct JointReturns {
+  std::size_t messages = 0;  // all
+  std::size_t count = 0;
+  double largest = 0;  // rad
+  std::string joint;   // that jumped by it
+};
+
 struct StampStatistics {
   std::size_t count = 0;
   double period = 0;  // s, median between stamps
@@ -61,7 +69,7 @@ struct Recorded {
   std::vector<TrackedPair> tracks;         // of consecutive images
   int image_width = 0, image_height = 0;
   std::array<StampStatistics, sensor_count> stamps;
-  bool joint_names_change = false;
+  JointReturns joint_returns;
   Reading reading;
 };
 
@@ -82,11 +90,13 @@ class Recorder {
   void take(const JointSample& sample);
   void take(const LidarScan& scan);
   void take(const CameraImage& image);
+  void count_return(double t, const std::vector<double>& positions);
 
   Recorded recorded_;
   bool begun_ = false;
   std::array<std::vector<double>, sensor_count> times_;
   double last_leg_ = -1e9;
+  std::array<LegSample, 2> before_;  // the last two messages of the legs as they came
   FeatureTracker tracker_;
 };
 
