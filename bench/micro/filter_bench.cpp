@@ -53,7 +53,7 @@ void predict_one_interval(benchmark::State& state) {
   interval.gyro_end = {0.12, 0.17, -0.11};
   interval.accel_begin = {0.3, 0.1, 9.7};
   interval.accel_end = {0.2, 0.15, 9.9};
-  const FootOrientations standing{SO3(), SO3()};
+  const StandingFeet standing{true, true};
   for (auto _ : state) {
     Estimate out = e;
     carry(out, interval, standing, {});

@@ -44,7 +44,7 @@ struct EstimatorConfig {
   double smooth_time = 0.5;    // s
   bool wait_for_images = true;
   bool gravity_align = true;
-  std::string settling = "legs";  // legs | all | none
+  std::string settling = "legs";  // legs | none
   int threads = 1;
   bool sweep_points = true;    // outputs of sweeps carry their points; no setting: the program knows whether anything reads them
   bool sweep_updates = false;  // likewise, how they changed the estimate
@@ -67,7 +67,7 @@ struct EstimatorConfig {
         Field{"smooth_time", &EstimatorConfig::smooth_time, "s", "the smooth odometry takes two thirds of a correction in over this time"},
         Field{"gravity_align", &EstimatorConfig::gravity_align, "-", "z of the world is up; false: the world is the first IMU frame"},
         Field{"settling", &EstimatorConfig::settling, "-",
-              "which sensors that come back wait for a usual acceleration: legs, all (LiDAR and camera too, as in the paper) or none"},
+              "legs: those that come back wait for a usual acceleration (paper, Section IV-E); none: they are used at once"},
         Field{"threads", &EstimatorConfig::threads, "-", "threads for sums over many points, 0: all cores; results do not depend on it"}};
   }
 };

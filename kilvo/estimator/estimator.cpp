@@ -20,8 +20,8 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
       legs_(config.legs),
       lidar_(robot.lidar, config.lidar, config.update, config.threads),
       map_(config.map, config.lidar, robot.lidar.T_imu_lidar.p),
-      frames_(robot.lidar.rate, input_.uses(Sensor::lidar), config.lidar.recut && input_.uses(Sensor::camera)),
-      status_(robot, config.settling) {
+      frames_(robot.lidar.rate, input_.uses(Sensor::lidar)),
+      status_(robot, config.settling != "none") {
   if (!input_.uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.surfaces().leaf_size() * (1 + 1e-9))
     throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");

@@ -13,20 +13,12 @@ bool is_scan(const FrameQueue::Frame& f) { return std::holds_alternative<LidarSc
 }  // namespace
 
 std::optional<FrameQueue::Frame> FrameQueue::push(LidarScan scan) {
-  std::vector<LidarScan> scans;
-  if (recut_) scans = recutter_.add(scan);
-  if (!recut_) scans.push_back(std::move(scan));
-  std::optional<Frame> crowded_out;
-  for (LidarScan& s : scans) {
-    const Time begin = begin_of(s), end = end_of(s);
-    crowded_out = insert(Frame{std::move(s), begin, end});
-  }
-  return crowded_out;
+  const Time begin = begin_of(scan), end = end_of(scan);
+  return insert(Frame{std::move(scan), begin, end});
 }
 
 std::optional<FrameQueue::Frame> FrameQueue::push(CameraImage image) {
   const Time t = image.t;
-  if (recut_) recutter_.add_image(t);
   return insert(Frame{std::move(image), t, t});
 }
 
@@ -57,9 +49,7 @@ std::optional<FrameQueue::Frame> FrameQueue::pop(Time until) {
 bool FrameQueue::waits_for_scan(Time image, Time until) const {
   if (ended_ || !with_scans_ || !last_middle_ || *last_middle_ + scan_period_ > image) return false;
   const bool has_passed = std::ranges::any_of(frames_, [image](const Frame& f) { return is_scan(f) && f.middle() > image; });
-  // One that is recut comes with the scan that the image lies in.
-  const auto tenths = recut_ ? 12 : 6;
-  return !has_passed && until < image + tenths * scan_period_ / 10 && image - *last_middle_ < 3 * scan_period_;
+  return !has_passed && until < image + 6 * scan_period_ / 10 && image - *last_middle_ < 3 * scan_period_;
 }
 
 }  // namespace kilvo

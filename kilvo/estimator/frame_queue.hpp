@@ -6,7 +6,6 @@
 #include <utility>
 #include <variant>
 
-#include "kilvo/estimator/scan_recutter.hpp"
 #include "kilvo/sensors/measurement.hpp"
 
 namespace kilvo {
@@ -23,9 +22,8 @@ class FrameQueue {
     Time middle() const { return begin + (end - begin) / 2; }
   };
 
-  /// `scan_rate`: nominal, Hz. `with_scans`: scans are to be expected. `recut`: so that each ends at an image.
-  FrameQueue(double scan_rate, bool with_scans, bool recut = false)
-      : scan_period_(from_seconds(1 / scan_rate)), with_scans_(with_scans), recut_(recut), recutter_(from_seconds(1.1 / scan_rate)) {}
+  /// `scan_rate`: nominal, Hz. `with_scans`: scans are to be expected.
+  FrameQueue(double scan_rate, bool with_scans) : scan_period_(from_seconds(1 / scan_rate)), with_scans_(with_scans) {}
 
   /// Takes a frame; gives back the oldest when too many wait.
   std::optional<Frame> push(LidarScan scan);
@@ -51,8 +49,7 @@ class FrameQueue {
   bool waits_for_scan(Time image, Time until) const;
 
   Duration scan_period_;
-  bool with_scans_, recut_;
-  ScanRecutter recutter_;
+  bool with_scans_;
   std::deque<Frame> frames_;  // by end
   std::optional<Time> last_middle_;
   bool ended_ = false;

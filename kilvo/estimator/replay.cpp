@@ -88,20 +88,17 @@ ProcessNoise Replay::noise_within(Time begin, Time end) const {
   return out;
 }
 
-FootOrientations Replay::standing_at(Time t) const {
-  FootOrientations out;
+StandingFeet Replay::standing_at(Time t) const {
+  StandingFeet out{};
   const auto after = std::upper_bound(steps_.begin(), steps_.end(), t, [](Time value, const LegStep& s) { return value < s.t; });
   if (after == steps_.begin()) return out;
-  for (std::size_t side = 0; side < 2; ++side) {
-    const Stance& foot = (after - 1)->foot[side];
-    if (foot.used) out[side] = foot.R_IF;
-  }
+  for (std::size_t side = 0; side < 2; ++side) out[side] = (after - 1)->foot[side].used;
   return out;
 }
 
 void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
   if (imu_.empty()) return;
-  const FootOrientations feet = standing_at(e.t);
+  const StandingFeet feet = standing_at(e.t);
   const ProcessNoise noise = noise_now();
   const auto step = [&](ImuInterval interval) {
     // What was missed or clipped is in no mean.

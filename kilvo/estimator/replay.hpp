@@ -110,7 +110,7 @@ class Replay {
   void inflate_for_faults(ImuInterval& interval, const ImuSample& a, const ImuSample& b) const;
   void inflate_for_missed(ImuInterval& interval, double gap) const;
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
-  FootOrientations standing_at(Time t) const;
+  StandingFeet standing_at(Time t) const;
   double longest_gap() const;  // between IMU samples, s
   ProcessNoise noise_now() const;
   double expected_density2() const;  // of the accelerometer's second differences, by the settings

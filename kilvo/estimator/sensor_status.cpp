@@ -7,8 +7,7 @@
 
 namespace kilvo {
 
-SensorStatus::SensorStatus(const Robot& robot, std::string_view settling)
-    : settles_all_(settling == "all"), settles_nothing_(settling == "none") {
+SensorStatus::SensorStatus(const Robot& robot, bool settles) : settles_(settles) {
   const auto rates = rates_of(robot);
   for (std::size_t s = 0; s < sensor_count; ++s) tracks_[s].rate = rates[s];
 }
@@ -35,15 +34,10 @@ void SensorStatus::use(Sensor s, Time t) {
 
 // Since this was first asked about, for so long that it goes on without calm.
 bool SensorStatus::has_waited(Sensor s, Time t) {
-  constexpr Duration longest_wait = std::chrono::seconds(1);
+  constexpr Duration patience = std::chrono::seconds(1);
   std::optional<Time>& since = track(s).waits_since;
   if (!since) since = t;
-  return t - *since >= longest_wait;
-}
-
-bool SensorStatus::may_frame_return(Sensor s, Time t, bool is_calm) {
-  const bool is_missing = track(s).was_used && !track(s).counts;
-  return !settles_all_ || !is_missing || is_calm || has_waited(s, t);
+  return t - *since >= patience;
 }
 
 void SensorStatus::lose_legs() {
@@ -65,7 +59,7 @@ bool SensorStatus::may_legs_return(Time t, bool is_calm, bool is_velocity_known,
   // Sweeps, if there are any, measure the velocity soon.
   const auto heard = health.heard(Sensor::lidar);
   const bool sweeps = heard && !is_silence(t - *heard, rate_of(Sensor::lidar));
-  const bool ready = (is_calm || settles_nothing_) && (is_velocity_known || !sweeps);
+  const bool ready = (is_calm || !settles_) && (is_velocity_known || !sweeps);
   if (!ready && !has_waited_long) return false;
   track(Sensor::legs).waits_since.reset();
   return true;

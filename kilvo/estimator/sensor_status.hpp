@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <string_view>
 
 #include "kilvo/estimator/modality.hpp"
 #include "kilvo/input/health.hpp"
@@ -15,8 +14,8 @@ namespace kilvo {
 
 class SensorStatus {
  public:
-  /// `settling`: see EstimatorConfig.
-  explicit SensorStatus(const Robot& robot, std::string_view settling = "legs");
+  /// `settles`: EstimatorConfig::settling.
+  explicit SensorStatus(const Robot& robot, bool settles = true);
 
   /// The first estimate is of `t`. `there`: by Sensor; legs and LiDAR count as used until they are silent.
   void begin(Time t, const std::array<bool, sensor_count>& there);
@@ -42,9 +41,6 @@ class SensorStatus {
   /// velocity. True in any case after a second.
   bool may_legs_return(Time t, bool is_calm, bool is_velocity_known, const Health& health);
 
-  /// The same for a sweep or image of a sensor that was lost.
-  bool may_frame_return(Sensor s, Time t, bool is_calm);
-
   void lose_imu(const Health& health);
   void imu_is_back() { imu_lost_ = false; }
   bool imu_lost() const { return imu_lost_; }
@@ -69,7 +65,7 @@ class SensorStatus {
   Reason cause_of_change(Sensor s, Time t, const Health& health) const;
 
   std::array<Track, sensor_count> tracks_;  // by Sensor
-  bool settles_all_, settles_nothing_;
+  bool settles_;
   double leg_period_ = 0;  // between the last two leg samples, s
   bool imu_lost_ = false;
   Modality modality_ = Modality::coast;

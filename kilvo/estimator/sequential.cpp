@@ -49,7 +49,6 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
   const Time begin = frame.begin, end = frame.end;
   if (end < history_.base().t) return findings_.drop(Sensor::lidar, Reason::before_state);
   if (history_.replay().is_blind(begin, end)) return findings_.drop(Sensor::lidar, Reason::no_imu);
-  if (!status_.may_frame_return(Sensor::lidar, end, imu_.is_calm(end))) return findings_.drop(Sensor::lidar, Reason::not_calm);
   if (frames_.last_middle()) lidar_.note_silence(begin - *status_.last_used(Sensor::lidar));
   if (moving_start_ && !moving_start_->is_over()) {
     if (!status_.has_legs()) {
@@ -82,8 +81,6 @@ void Estimator::process(const LidarScan& scan, const FrameQueue::Frame& frame, s
     return history_.advance_to(end);
   }
   if (sweep.searched) lidar_.rejoin();
-  if (config_.lidar.least_ratio > 0 && eigenvalue_ratio(sweep.points) < config_.lidar.least_ratio)
-    return findings_.drop(Sensor::lidar, Reason::agrees_with_nothing);
   history_.resume(sweep.posterior);
   const bool good = keep_plausible(true);
   Output result;
@@ -136,7 +133,6 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
   const double rate = input_.robot().lidar.rate;
   if (is_silence(image.t - frames_.last_middle().value_or(Time{}) - from_seconds(0.5 / rate), rate)) return refuse(Reason::no_lidar);
   if (lidar_.is_rejoining()) return refuse(Reason::before_rejoined);
-  if (!status_.may_frame_return(Sensor::camera, image.t, imu_.is_calm(image.t))) return refuse(Reason::not_calm);
   Stopwatch watch;
   ImageContext context;
   context.prior = history_.at(std::max(image.t, history_.base().t));
@@ -145,12 +141,7 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
   context.gyro = history_.replay().gyro_at(image.t).value_or(context.prior.x.bg);
   context.unobservable = lidar_.unobservable();
   context.feet_hold = lidar_.is_blind_somewhere() && status_.has_legs() && legs_.has_stood_lately(image.t);
-  VisualRegistration seen = vision_->measure(image, context);
-  if (!seen.refused && seen.used < config_.vision.fewest_points) {
-    seen.posterior = context.prior;
-    seen.carries = false;
-    seen.drift.clear();
-  }
+  const VisualRegistration seen = vision_->measure(image, context);
   if (seen.refused == Reason::pose_uncertain) return refuse(*seen.refused);
   if (seen.refused == Reason::not_finite) {
     history_.resume(seen.posterior);

@@ -59,7 +59,7 @@ TEST(LongRun, TheCovarianceStaysSymmetricPositiveDefiniteOverAMillionMixedSteps)
     } else {
       const Time end = e.t + Duration(i % 7 == 0 ? 1'000'000 : 5'000'000);
       const ImuSample s{e.t, random.vector3(0.5), Eigen::Vector3d(0, 0, standard_gravity) + random.vector3(1)};
-      const FootOrientations feet = {i % 200 < 100 ? std::optional<SO3>(SO3()) : std::nullopt, std::nullopt};
+      const StandingFeet feet = {i % 200 < 100, false};
       e = test::predict(e, ImuInterval::hold(s, e.t, end), feet, {});
     }
     if (i % 1000 == 999 || i % 1000 == 998) {

@@ -66,7 +66,7 @@ void move(const Transition& F, Covariance& P) {
   }
 }
 
-void add_process_noise(Covariance& P, const Motion& m, const Eigen::Vector3d& up_W, const FootOrientations& feet, const ProcessNoise& n,
+void add_process_noise(Covariance& P, const Motion& m, const Eigen::Vector3d& up_W, const StandingFeet& feet, const ProcessNoise& n,
                        const ImuInterval& interval) {
   const double dt = m.dt, scale = interval.made_biases ? 0 : 1;
   const auto add = [&P](int row, int col, double value) { P.diagonal(col - row).segment<3>(std::min(row, col)).array() += value; };
@@ -79,13 +79,11 @@ void add_process_noise(Covariance& P, const Motion& m, const Eigen::Vector3d& up
   add(at::bg, at::bg, n.gyro_bias * n.gyro_bias * dt);
   add(at::ba, at::ba, n.accel_bias * n.accel_bias * dt);
   for (int foot = 0; foot < 2; ++foot) {
-    // A foot that does not stand gets none. Round gravity it is isotropic, so the foot's orientation drops out.
-    const auto& R_IF = feet[static_cast<std::size_t>(foot)];
-    if (!R_IF) continue;
-    const Eigen::Vector3d axis = n.foot_turns ? m.R1 * (*R_IF * Eigen::Vector3d::UnitZ()) : up_W;
+    // A foot that does not stand gets none. Round gravity it is isotropic, so the foot's orientation drops out (paper, Eq. 2: it turns).
+    if (!feet[static_cast<std::size_t>(foot)]) continue;
     const int pc = at::pcl + 3 * foot;
     add(pc, pc, n.foot * n.foot * dt);
-    P.block<3, 3>(pc, pc) += (n.foot_vertical * n.foot_vertical - n.foot * n.foot) * dt * axis * axis.transpose();
+    P.block<3, 3>(pc, pc) += (n.foot_vertical * n.foot_vertical - n.foot * n.foot) * dt * up_W * up_W.transpose();
   }
   P(at::tau, at::tau) += n.exposure * n.exposure * dt;
 }
@@ -106,7 +104,7 @@ ImuInterval ImuInterval::between(const ImuSample& a, const ImuSample& b, Time be
 
 State predict_mean(const State& x, const ImuInterval& interval) { return mean_after(x, motion_of(x, interval)); }
 
-void carry(Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise, Transition* kept) {
+void carry(Estimate& e, const ImuInterval& interval, const StandingFeet& feet, const ProcessNoise& noise, Transition* kept) {
   assert(interval.begin == e.t && interval.end >= interval.begin);
   const Motion m = motion_of(e.x, interval);
   const ForceJacobians j = jacobians_of(e.x, m);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 #include <tuple>
 
 #include "kilvo/filter/state.hpp"
@@ -36,7 +35,6 @@ struct ProcessNoise {
   double foot = 0.005;           // m/sqrt(s), of a stance foot, each axis of the foot frame
   double exposure = 0.05;        // 1/sqrt(s)
   double foot_vertical = 0.025;  // m/sqrt(s), of a stance foot against gravity
-  bool foot_turns = false;       // foot_vertical is along the foot's own vertical
 
   static constexpr auto fields() {
     return std::tuple{
@@ -48,19 +46,18 @@ struct ProcessNoise {
         Field{"accel_bias_walk", &ProcessNoise::accel_bias, "m/s^2/sqrt(s)", "random walk of the accelerometer bias"},
         Field{"foot_noise", &ProcessNoise::foot, "m/sqrt(s)", "random walk of a stance foot"},
         Field{"foot_noise_vertical", &ProcessNoise::foot_vertical, "m/sqrt(s)", "the same along the vertical"},
-        Field{"foot_noise_turns", &ProcessNoise::foot_turns, "-", "that vertical is the foot's (paper, Eq. 2), not that of gravity"},
         Field{"exposure_walk", &ProcessNoise::exposure, "1/sqrt(s)", "random walk of the relative inverse exposure"}};
   }
 };
 
-/// R_I,foot of each stance foot; none for a foot that does not stand (its contact position is then not in use).
-using FootOrientations = std::array<std::optional<SO3>, 2>;
+/// Of each foot: it stands. The contact position of one that does not is not in use.
+using StandingFeet = std::array<bool, 2>;
 
 /// How the error of R, p and v depends on all errors before.
 using Transition = Eigen::Matrix<double, 9, at::size, Eigen::RowMajor>;
 
 /// Moves the estimate from interval.begin to interval.end. `e.t` must be interval.begin and the interval not negative.
-void carry(Estimate& e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise, Transition* kept = nullptr);
+void carry(Estimate& e, const ImuInterval& interval, const StandingFeet& feet, const ProcessNoise& noise, Transition* kept = nullptr);
 
 /// The mean alone.
 State predict_mean(const State& x, const ImuInterval& interval);

@@ -164,7 +164,7 @@ TEST(Predict, TheCovarianceIsTransportedByTheTransition) {
 Estimate one_second(double rate, double more_gyro = 0, double more_accel = 0) {
   Estimate e;
   e.t = begin_time;
-  const FootOrientations standing = {SO3(), SO3()};
+  const StandingFeet standing = {true, true};
   for (int i = 0; i < static_cast<int>(rate); ++i) {
     ImuInterval interval = ImuInterval::hold({e.t, {0.3, -0.2, 0.5}, {0.5, 1, 9.5}}, e.t, begin_time + from_seconds((i + 1) / rate));
     interval.more_gyro = more_gyro;
@@ -207,7 +207,7 @@ TEST(Predict, AFootThatDoesNotStandGetsNoNoise) {
   Estimate e;
   e.t = begin_time;
   const ImuInterval interval = ImuInterval::hold({e.t, {0, 0, 0}, {0, 0, 9.8}}, e.t, e.t + from_seconds(0.1));
-  const Covariance P = test::predict(e, interval, {std::nullopt, SO3()}, {}).P;
+  const Covariance P = test::predict(e, interval, {false, true}, {}).P;
   EXPECT_EQ(P(at::pcl, at::pcl), 0);
   EXPECT_NEAR(P(at::pcr, at::pcr), ProcessNoise{}.foot * ProcessNoise{}.foot * 0.1, 1e-12);
 }

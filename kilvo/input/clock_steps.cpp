@@ -12,7 +12,7 @@ namespace {
 // So many samples in a row show that the time stays where it went, when so many messages of the others say so too.
 constexpr int few_witnesses = 3;
 // Beyond, the robot need not be where it was: nothing is remembered for so long.
-constexpr Duration longest_step = std::chrono::seconds(2);
+constexpr Duration longest_clock_step = std::chrono::seconds(2);
 // Legs that come as often are a clock.
 constexpr Duration often = std::chrono::milliseconds(5);
 // The years 1933 to 2116; and steps of 36 years in all. Beyond, differences of times are no times any more.
@@ -59,7 +59,7 @@ std::optional<Reason> ClockSteps::follow_imu(Time t) {
   if (!back && !(alone_ahead && seconded)) return note_hole(run.first), imu.newest = now, std::nullopt;
   // Nothing is missing: the first of them came one period after the newest before.
   last_ = *imu.newest + (now - run.first) / (run.length - 1) - run.first;
-  if (back && !alone && last_ > longest_step) return restart(t), std::nullopt;
+  if (back && !alone && last_ > longest_clock_step) return restart(t), std::nullopt;
   if (std::chrono::abs(imu.offset + last_) > era) return Reason::clock_back;
   ++count_;
   for (Clock& clock : clocks_) clock.may_step_until = Time::max();
@@ -123,7 +123,7 @@ void ClockSteps::follow_other(Clock& clock, Time t) {
   const Duration lag = newest - (t + clock.offset);
   const double most = to_seconds(least_silence);  // one message that is late by hours is not to be followed
   clock.usual_lag = usual + from_seconds(std::clamp(to_seconds(lag) - to_seconds(usual), -most, most) / 10);
-  clock.note_lag(lag, longest_step);
+  clock.note_lag(lag, longest_clock_step);
 }
 
 std::optional<Reason> ClockSteps::follow(Measurement& m) {

@@ -1,4 +1,4 @@
-// Plausibility of the sensors' messages as they arrive: absurd, repeated and clipped values, rate, jitter, clocks.
+// Plausibility of the sensors' messages as they arrive: absurd and repeated values, rate, jitter, clocks. Clipped samples are counted.
 #pragma once
 
 #include <array>

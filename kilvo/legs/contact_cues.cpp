@@ -49,7 +49,7 @@ double CueTracker::side_of_force(const Feet& feet, const State& x) const {
 ContactCues CueTracker::update(const Feet& feet, const State& x, const std::array<FootMotion, 2>& motion, const Eigen::Vector3d& force_W,
                                double threshold) {
   ContactCues out;
-  out.dt = last_ ? std::clamp(to_seconds(feet.t - *last_), 0.0, longest_step) : 0;
+  out.dt = last_ ? std::clamp(to_seconds(feet.t - *last_), 0.0, to_seconds(least_silence)) : 0;
   const Eigen::Vector3d up_W = -x.g.normalized();
   leg_length_ = std::max(shortest_leg, up_W.dot(x.p) - std::min(up_W.dot(motion[0].lowest), up_W.dot(motion[1].lowest)));
   const double load = force_W.norm();

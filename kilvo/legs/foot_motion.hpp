@@ -10,9 +10,6 @@
 
 namespace kilvo {
 
-/// Between samples of the legs, s; what takes longer counts as that.
-inline constexpr double longest_step = to_seconds(least_silence);
-
 /// Velocity in the world of a point that is at p_I and moves by v_I relative to the IMU, m/s. `omega`: bias-free rate, rad/s.
 inline Eigen::Vector3d velocity_W(const State& x, const Eigen::Vector3d& p_I, const Eigen::Vector3d& v_I, const Eigen::Vector3d& omega) {
   return x.v + x.R * (omega.cross(p_I) + v_I);

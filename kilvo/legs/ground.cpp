@@ -9,8 +9,6 @@ namespace kilvo {
 namespace {
 
 const double steepest = std::cos(30 * M_PI / 180);
-// How far above or below its own plane a foot may seem to be, m: what was drifted meanwhile. Less than the height of a stair.
-constexpr double reach = 0.1;
 // A contact that is so far from the plane of the others began another piece of ground, m.
 constexpr double same_ground = 0.02;
 // Contacts themselves, m.
@@ -22,9 +20,9 @@ constexpr double slope_sigma = 0.1;
 
 std::optional<GroundPatch> GroundLookup::of_map(const VoxelMap& map, const Eigen::Vector3d& p_W, const Eigen::Vector3d& up_W) {
   std::optional<GroundPatch> best;
-  double nearest = reach;
+  double nearest = stair;  // a foot seems to be above or below its own plane by what was drifted meanwhile
   // The floor may lie just beyond the boundary of the voxel that holds the foot.
-  for (const double offset : {0.0, reach, -reach}) {
+  for (const double offset : {0.0, stair, -stair}) {
     map.visit_planes(p_W + offset * up_W, [&](const VoxelMap::Match& match) {
       const Plane& plane = *match.plane;
       const Eigen::Vector3d normal = plane.normal.cast<double>().normalized();

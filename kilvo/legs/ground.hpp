@@ -10,6 +10,9 @@
 
 namespace kilvo {
 
+/// Ground that is higher or lower by more is reached by a step, m.
+inline constexpr double stair = 0.1;
+
 /// A piece of ground in the world.
 struct GroundPatch {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // upwards

@@ -29,9 +29,8 @@ struct Stance {
   double slide_variance = 0;                             // along the ground since the sample before, m^2
   double variance_scale = 1;                             // factor on the variance of its rows (Eq. 8)
   std::optional<Eigen::Matrix<double, 7, 1>> row_scale;  // another one on that of each: velocity, position, height
-  SO3 R_IF;
-  std::optional<GroundPatch> ground;  // on which it has just come down: its height counts once
-  std::optional<GroundPatch> level;   // the same, relative to the other foot, which stands: normal and sigma
+  std::optional<GroundPatch> ground;                     // on which it has just come down: its height counts once
+  std::optional<GroundPatch> level;                      // the same, relative to the other foot, which stands: normal and sigma
 };
 
 /// One leg sample, ready for the filter: it can be applied again when the state before it has been corrected.

@@ -141,7 +141,7 @@ std::array<bool, 2> StanceTracker::carriers(const Contacts& contacts, double dt)
 // A step up or down is as likely as the last ones were high.
 std::optional<GroundPatch> StanceTracker::level_with_other(std::size_t side, const Eigen::Vector3d& p_W, const State& x,
                                                            const Eigen::Vector3d& normal_W) {
-  constexpr double least_step = 0.005, most_step = 0.03, stair = 0.1;  // m
+  constexpr double least_step = 0.005, most_step = 0.03;  // m
   // The normal of the ground is off by the same for many steps.
   constexpr double doubt = 2;
   if (!feet_[1 - side].weights) return std::nullopt;
@@ -179,6 +179,7 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
                             const Support& support) {
   LegStep out;
   out.t = feet.t;
+  const double longest_step = to_seconds(least_silence);
   out.dt = last_ ? std::clamp(to_seconds(feet.t - *last_), shortest_step, longest_step) : longest_step;
   const std::array<bool, 2> carries = carriers(contacts, last_ ? out.dt : 0);
   last_ = feet.t;
@@ -190,7 +191,6 @@ LegStep StanceTracker::step(const Feet& feet, const Contacts& contacts, const St
     Stance& foot = out.foot[side];
     Foot& state = feet_[side];
     foot.ends = std::exchange(state.leaves, false);
-    foot.R_IF = pose.R_IF;
     // It came down at some time since the sample before the one that shows it.
     if (!state.weights) state.touchdown = contacts.since[side];
     const double phase = to_seconds(feet.t - state.touchdown) + out.dt;

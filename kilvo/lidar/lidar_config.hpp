@@ -14,8 +14,6 @@ struct LidarConfig {
   double voxel_size = 0.25;    // m
   double gate = 3.0;
   double weak_share = 0.002;
-  double least_ratio = 0;
-  bool recut = false;
   bool mount_error = true;
 
   /// How far noise carries points of a surface beyond a voxel's face, m.
@@ -31,10 +29,6 @@ struct LidarConfig {
         Field{"gate", &LidarConfig::gate, "sigma", "rows farther from their plane than this are not used"},
         Field{"weak_share", &LidarConfig::weak_share, "-",
               "a direction with less than this share of a sweep's information on position is left to legs and images"},
-        Field{"least_ratio", &LidarConfig::least_ratio, "-",
-              "a scan that is flatter (smallest eigenvalue of the points' scatter over the largest) is not used, and the "
-              "modality changes as if it were lost; 0: never"},
-        Field{"recut", &LidarConfig::recut, "-", "scans are recombined so that each ends at an image; false: they are used as they come"},
         Field{"mount_error", &LidarConfig::mount_error, "-",
               "reported sigmas allow for a LiDAR that is not mounted quite as described; false: the mount is known exactly"}};
   }

@@ -84,7 +84,7 @@ Grid grid_around(const Estimate& e) {
   return out;
 }
 
-bool alike(const SE3& a, const SE3& b, double place, double heading) {
+bool are_alike(const SE3& a, const SE3& b, double place, double heading) {
   return (a.p - b.p).norm() < place && (a.R.inverse() * b.R).Log().norm() < heading;
 }
 
@@ -99,7 +99,7 @@ std::vector<Candidate> best_of(std::vector<Candidate> all) {
   std::vector<Candidate> out;
   for (const Candidate& c : all) {
     if (out.size() == finalists) break;
-    if (std::ranges::none_of(out, [&c](const Candidate& o) { return alike(o.T_WI, c.T_WI, 1.1 * step, 1.1 * yaw_step); })) out.push_back(c);
+    if (std::ranges::none_of(out, [&c](const Candidate& o) { return are_alike(o.T_WI, c.T_WI, 1.1 * step, 1.1 * yaw_step); })) out.push_back(c);
   }
   return out;
 }
@@ -155,7 +155,7 @@ std::optional<FoundPose> find_pose(const VoxelMap& map, std::span<const PointClu
   // The right place may lie beyond a grid that had to be cut: then a place within has to explain all of the sweep.
   if (best == found.end() || (grid.is_whole ? best->share : worth(*best)) < least_share) return std::nullopt;
   for (const FoundPose& other : found) {
-    if (!alike(other.x.pose(), best->x.pose(), same_place, same_heading) && worth(other) > (1 - clearly) * worth(*best))
+    if (!are_alike(other.x.pose(), best->x.pose(), same_place, same_heading) && worth(other) > (1 - clearly) * worth(*best))
       return std::nullopt;
   }
   return *best;

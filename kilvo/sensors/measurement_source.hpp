@@ -1,4 +1,4 @@
-// Where measurements come from: a recording, the simulator, a robot. The one virtual interface of the project.
+// Where measurements come from: a recording, the simulator, a robot.
 #pragma once
 
 #include <optional>

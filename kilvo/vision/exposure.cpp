@@ -30,7 +30,7 @@ std::optional<Brightness> PhotometricModel::exposure_at(const State& x) const {
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     const Prepared& p = prepared_[i];
     const auto view = begins_at(x) ? p.first_view : view_of(camera_, at_.T_CI, x.pose(), p.p_W);
-    if (!p.patch || !view || !camera_.sees(view->pixel, selected_border * (1 << level_))) continue;
+    if (!p.patch || !view || !camera_.sees(view->pixel, border_at(level_ + 1))) continue;
     Values seen;
     sample_patch(pyramid_[static_cast<std::size_t>(level_)], at_level(view->pixel, level_).cast<float>(), seen);
     const auto [patch, tau] = as_first_seen(i, T_CW);

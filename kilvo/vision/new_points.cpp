@@ -70,7 +70,7 @@ void add_plain(const Search& search, int block, std::span<const PatchCandidate> 
   for (const NewPoint& p : out) taken[blocks.of(p.pixel)] = true;
   for (const DepthView::Seen& s : search.depth.seen()) {
     const Eigen::Vector2d pixel = pixel_of(s);
-    if (!search.camera.sees(pixel, new_point_border) || taken[blocks.of(pixel)] || !search.is_even(pixel)) continue;
+    if (!search.camera.sees(pixel, border_at(2)) || taken[blocks.of(pixel)] || !search.is_even(pixel)) continue;
     const auto found = search.at(pixel, s, some);
     if (!found) continue;
     taken[blocks.of(pixel)] = true;
@@ -106,7 +106,7 @@ std::vector<NewPoint> new_points(const VoxelMap& map, const Camera& camera, cons
   std::vector<NewPoint> best(grid.size());
   for (const DepthView::Seen& s : depth.seen()) {
     const Eigen::Vector2d pixel = pixel_of(s);
-    if (!camera.sees(pixel, new_point_border)) continue;
+    if (!camera.sees(pixel, border_at(2))) continue;
     const std::size_t cell = grid.of(pixel);
     if (taken[cell]) continue;
     const float corner = corner_of(image, static_cast<int>(pixel.x()), static_cast<int>(pixel.y()));

@@ -15,9 +15,6 @@
 
 namespace kilvo {
 
-/// Pixels around a new point, or a new view of one, that its coarser patches need.
-inline constexpr double new_point_border = 20;
-
 struct NewPoint {
   VisualPoint point;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();

@@ -25,6 +25,9 @@ struct Template {
   std::array<float, count> value, dx, dy;
 };
 
+/// Pixels of the finest level that a patch of this one needs on each side, one for the interpolation included.
+constexpr double border_at(int level) { return (Template::size / 2 + 1) << level; }
+
 /// How the picture of a plane changes between two views, about a point of it: what is d pixels beside the point in one view is
 /// A d / (1 + c'd) beside it in the other, both of level 0. Without c, patches of a wall along which a robot walks seem to move too far.
 struct PlaneWarp {

@@ -11,8 +11,6 @@
 namespace kilvo {
 namespace {
 
-// Pixels a patch needs around it at its level.
-constexpr double patch_border = 5;
 // An expected error of so many pixels is within reach of the finest level; twice that of the next.
 constexpr double reach = 0.7;
 
@@ -99,8 +97,8 @@ PhotometricModel::Part PhotometricModel::evaluate(std::size_t i, const State& x)
   if (!view) return out;
   const GreyImage& image = pyramid_[static_cast<std::size_t>(level_)];
   const Eigen::Vector2d at = at_level(view->pixel, level_);
-  if (at.x() < patch_border || at.y() < patch_border || at.x() > image.width - 1 - patch_border || at.y() > image.height - 1 - patch_border)
-    return out;
+  const double border = border_at(0);  // in pixels of this level
+  if (at.x() < border || at.y() < border || at.x() > image.width - 1 - border || at.y() > image.height - 1 - border) return out;
   Values seen;
   sample_patch(image, at.cast<float>(), seen);
   verdict.correlation = correlation(seen, p.patch->value);

@@ -122,7 +122,7 @@ std::vector<PatchCandidate> select_patches(const VisualMap& map, const Camera& c
     map.visit(key, [&](std::uint32_t id, const VisualPoint& p) {
       const Eigen::Vector3d p_C = T_CW * p.p_W;
       const auto pixel = camera.project(p_C);
-      if (!pixel || !camera.sees(*pixel, selected_border)) return;
+      if (!pixel || !camera.sees(*pixel, border_at(1))) return;
       // Those that have proven themselves first.
       const double worth = static_cast<double>(p.corner) * (1.0 + std::min<int>(p.seen, 10)) / (1.0 + p.failed);
       for (std::size_t k = 0; k < p.count; ++k) __builtin_prefetch(&map.observation(p.observations[k]));

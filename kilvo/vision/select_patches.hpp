@@ -37,8 +37,6 @@ class CellGrid {
   int cell_, columns_, rows_;
 };
 
-/// Pixels that a patch needs around it, at its level.
-inline constexpr double selected_border = 10;
 /// So many corners determine the exposure alone.
 inline constexpr std::size_t enough_corners = 8;
 /// With more of them plain patches are neither begun nor looked at.

@@ -16,7 +16,6 @@ struct VisionConfig {
   double min_corner = 4.0;  // grey^2/px^2
   double min_correlation = 0.8;
   double gate = 4.0;  // sigma
-  int fewest_points = 0;
   bool adapt_exposure = true;
   bool new_views = true;
 
@@ -30,8 +29,6 @@ struct VisionConfig {
         Field{"min_corner", &VisionConfig::min_corner, "-", "smaller eigenvalue of the gradient's scatter, per pixel, of a patch to keep"},
         Field{"min_correlation", &VisionConfig::min_correlation, "-", "patches that correlate less are not the same surface"},
         Field{"gate", &VisionConfig::gate, "sigma", "patches found farther than this from where they are expected are not used"},
-        Field{"fewest_points", &VisionConfig::fewest_points, "-",
-              "an image that shows fewer points of the map is not used, and the modality changes as if it were lost; 0: never"},
         Field{"adapt_exposure", &VisionConfig::adapt_exposure, "-", "exposures may jump; false: they only walk (camera.exposure_walk)"},
         Field{"new_views", &VisionConfig::new_views, "-", "points keep views that differ much from their first as well; false: only that"}};
   }

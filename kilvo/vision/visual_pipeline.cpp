@@ -277,7 +277,7 @@ void VisualPipeline::judge_points(const Work& work, const VoxelMap& map, const S
     if (project_to_plane(map, -(first.R.inverse() * first.p), point))
       map_.refresh(track.point, point.p_W, point.normal_W, point.variance, point.node);
     const auto pixel = camera_.project(T_CW * point.p_W);
-    if (!config_.new_views || !is_new_view(track) || !pixel || !camera_.sees(*pixel, new_point_border)) continue;
+    if (!config_.new_views || !is_new_view(track) || !pixel || !camera_.sees(*pixel, border_at(2))) continue;
     const Eigen::Vector2f stored = pixel->cast<float>();
     if (const auto patch = cut_patch(work.pyramid, stored.cast<double>()))
       map_.observe(track.point, {.frame = frame, .pixel = stored, .patch = *patch});

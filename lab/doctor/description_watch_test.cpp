@@ -198,7 +198,9 @@ TEST(DescriptionWatch, BeginsAnewWhereStampsJumpBack) {
       if (earlier > 0) turn_knee_round(measurement, failure + 1);
       watch.take(measurement);
     }
-    if (earlier == 0) { EXPECT_THAT(watch.news(), IsEmpty()); }
+    if (earlier == 0) {
+      EXPECT_THAT(watch.news(), IsEmpty());
+    }
   }
   const std::vector<WrongDescription> wrong = watch.finish();
   ASSERT_FALSE(wrong.empty());

@@ -102,15 +102,16 @@ bool Examination::joints_jump() {
   const JointReturns& returns = recorded_.joint_returns;
   const double share = static_cast<double>(returns.count) / std::max(1.0, static_cast<double>(returns.messages));
   if (returns.count < fewest || share < rare) return false;
-  find({Sensor::legs,
-        "joints_jump",
-        fmt::format("joints jump and are back in the next message: {} of {} messages", returns.count, returns.messages),
-        fmt::format("{} by up to {:.2f} rad", returns.joint, returns.largest),
-        "only the robot's encoders may publish on the topic of the joints: look for another publisher (joint_state_publisher, a simulation)",
-        share,
-        "of the messages",
-        {},
-        share > few});
+  find(
+      {Sensor::legs,
+       "joints_jump",
+       fmt::format("joints jump and are back in the next message: {} of {} messages", returns.count, returns.messages),
+       fmt::format("{} by up to {:.2f} rad", returns.joint, returns.largest),
+       "only the robot's encoders may publish on the topic of the joints: look for another publisher (joint_state_publisher, a simulation)",
+       share,
+       "of the messages",
+       {},
+       share > few});
   return share > few;
 }
 

@@ -58,7 +58,6 @@ constexpr std::pair<std::string_view, Range> ranges[] = {
     {"lidar.voxel_size", {0.01, 25}},
     {"lidar.gate", above_zero()},
     {"lidar.weak_share", up_to(1)},
-    {"lidar.least_ratio", up_to(1)},
     {"camera.rate", above_zero(1000)},
     {"camera.time_offset", another_epoch},
     {"camera.width", {1, 20000}},
@@ -75,7 +74,6 @@ constexpr std::pair<std::string_view, Range> ranges[] = {
     {"camera.min_corner", above_zero()},
     {"camera.min_correlation", {-1, 1}},
     {"camera.gate", above_zero()},
-    {"camera.fewest_points", {0, 10000}},
     {"camera.exposure_walk", up_to(any)},
     {"map.voxel_size", {0.04, 100}},
     {"map.min_points", {3, any}},
@@ -125,10 +123,10 @@ const std::vector<std::string>& choices_of(std::string_view key) {
       {"legs.velocities", {"messages", "positions"}},
       {"legs.clock", {"stamp", "arrival", "estimated"}},
       {"legs.contact", {"kilvo", "paper", "variance", "force"}},
+      {"estimator.settling", {"legs", "none"}},
       {"legs.adaptation", {"foot", "row", "none"}},
       {"legs.height", {"ki", "always", "never"}},
       {"legs.ground", {"map", "contacts"}},
-      {"estimator.settling", {"legs", "all", "none"}},
       {"camera.model", {"pinhole_radtan", "equidistant"}},
   };
   const auto found = table.find(key);

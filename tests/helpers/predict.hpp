@@ -5,7 +5,7 @@
 
 namespace kilvo::test {
 
-inline Estimate predict(Estimate e, const ImuInterval& interval, const FootOrientations& feet, const ProcessNoise& noise) {
+inline Estimate predict(Estimate e, const ImuInterval& interval, const StandingFeet& feet, const ProcessNoise& noise) {
   carry(e, interval, feet, noise);
   return e;
 }
