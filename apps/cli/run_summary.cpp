@@ -54,7 +54,9 @@ void RunSummary::count_seconds(const Output& output, double dt) {
   if (dt > gap) return;
   output_seconds_ += dt;
   // A robot that stands is held by that.
-  if (output.modality == Modality::coast && output.x.v.norm() > stands) unmeasured_ += dt;
+  const bool is_unmeasured = output.modality == Modality::coast && output.x.v.norm() > stands;
+  unmeasured_ += is_unmeasured ? dt : 0;
+  unmeasured_at_end_ = output.modality == Modality::coast ? unmeasured_at_end_ + (is_unmeasured ? dt : 0) : 0;
 }
 
 void RunSummary::count_touchdowns(const Contacts& contacts) {

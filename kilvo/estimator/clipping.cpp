@@ -7,12 +7,12 @@
 namespace kilvo {
 namespace {
 
-// Values of one end differ by no more than the last bit of 16.
-constexpr double tolerance = 1e-4;
+// A usual range is known to the last bit of 16; values at one end are the same but for rounding.
+constexpr double tolerance = 1e-4, rounding = 1e-6;
 // No sensor's range ends below, and at rest no value comes near: rad/s, m/s^2.
 constexpr double least_gyro = 2.0, least_accel = 15.0;
 
-bool is_near(double value, double end) { return std::abs(value - end) < tolerance * end; }
+bool is_near(double value, double end, double share = tolerance) { return std::abs(value - end) < share * end; }
 
 bool is_usual_gyro(double rate) {
   constexpr std::array degrees = {125.0, 245.0, 250.0, 400.0, 500.0, 1000.0, 2000.0};
@@ -28,7 +28,19 @@ bool is_usual_accel(double accel) {
 
 }  // namespace
 
-bool ClippingDetector::is_at_end(const Eigen::Vector3d& v, Range& range, double least, bool (*is_usual)(double)) {
+// A motion that turns round has more values just below its largest than as large ones: in steps of 16 bits its largest comes again.
+bool ClippingDetector::count_at(Range::End& end, double size, int by_chance) {
+  constexpr double beside = 5e-3;
+  if (is_near(size, end.largest, rounding)) return ++end.at > std::max(by_chance, end.near);
+  if (size < end.largest) {
+    end.near += is_near(size, end.largest, beside) ? 1 : 0;
+    return false;
+  }
+  end = {size, 1, is_near(end.largest, size, beside) ? end.near + end.at : 0};
+  return false;
+}
+
+bool ClippingDetector::is_at_end(const Eigen::Vector3d& v, Range& range, double least, int by_chance, bool (*is_usual)(double)) {
   bool at_end = false;
   for (int i = 0; i < 3; ++i) {
     const double size = std::abs(v[i]);
@@ -37,16 +49,17 @@ bool ClippingDetector::is_at_end(const Eigen::Vector3d& v, Range& range, double 
       continue;
     }
     if (size < least) continue;
-    double& largest = range.largest[static_cast<std::size_t>(2 * i + (v[i] < 0 ? 1 : 0))];
-    at_end = at_end || is_near(size, largest) || (size > largest && is_usual(size));
-    largest = std::max(largest, size);
+    Range::End& end = range.ends[static_cast<std::size_t>(2 * i + (v[i] < 0 ? 1 : 0))];
+    const bool is_there = count_at(end, size, by_chance);
+    at_end = at_end || is_there || (is_near(size, end.largest) && is_usual(size));
   }
   return at_end;
 }
 
+// Rates are smooth: two samples beside a peak may be the same. Of accelerations, which are rougher, only one is.
 void ClippingDetector::mark(ImuSample& s) {
-  s.gyro_clipped = is_at_end(s.gyro, gyro_, least_gyro, is_usual_gyro);
-  s.accel_clipped = is_at_end(s.accel, accel_, least_accel, is_usual_accel);
+  s.gyro_clipped = is_at_end(s.gyro, gyro_, least_gyro, 2, is_usual_gyro);
+  s.accel_clipped = is_at_end(s.accel, accel_, least_accel, 1, is_usual_accel);
 }
 
 }  // namespace kilvo

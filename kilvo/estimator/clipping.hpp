@@ -1,4 +1,5 @@
-// Finds IMU samples at the end of the sensor's range: a setting, or found as the largest value of an axis that comes again or is usual.
+// Finds IMU samples at the end of the sensor's range: a setting, or found as the largest value of an axis where those of a
+// motion pile up, or that is usual.
 #pragma once
 
 #include <array>
@@ -18,9 +19,14 @@ class ClippingDetector {
  private:
   struct Range {
     double given;
-    std::array<double, 6> largest;  // by axis and sign: the size of the largest until now
+    struct End {
+      double largest = 0;    // the size of the largest value until now
+      int at = 0, near = 0;  // values of that size; of a little less
+    };
+    std::array<End, 6> ends{};  // by axis and sign
   };
-  static bool is_at_end(const Eigen::Vector3d& v, Range& range, double least, bool (*is_usual)(double));
+  static bool count_at(Range::End& end, double size, int by_chance);
+  static bool is_at_end(const Eigen::Vector3d& v, Range& range, double least, int by_chance, bool (*is_usual)(double));
 
   Range gyro_, accel_;
 };

@@ -63,6 +63,21 @@ TEST(Clipping, IsNotFoundWhereNothingIsCut) {
   EXPECT_EQ(marked(detector, 35, 1e3, clipped), 0);
 }
 
+// A torso that turns to and fro, by a gyroscope with steps of 16 bits: its largest rate comes again and again.
+TEST(Clipping, IsNotFoundWhereAMotionTurnsRound) {
+  constexpr double step = 2000 * M_PI / 180 / 32768;
+  ClippingDetector detector(0, 0);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise(0, 2e-3);
+  for (int i = 0; i < 6000; ++i) {
+    ImuSample s;
+    s.accel = {0, 0, 9.81};
+    s.gyro = {0, 0, step * std::round((2.7 * std::sin(2 * M_PI * 0.6 * i / 200.0) + noise(random)) / step)};
+    detector.mark(s);
+    EXPECT_FALSE(s.gyro_clipped) << i;
+  }
+}
+
 TEST(Clipping, IsNotFoundAtRest) {
   ClippingDetector detector(0, 0);
   for (int i = 0; i < 100; ++i) {

@@ -59,6 +59,7 @@ void Findings::look(Time t, const Situation& now) {
   report_streams(now);
   judge_speed(now);
   judge_biases(now);
+  judge_coasting(now);
   if (t - use_looked_at_ < use_period) return;
   use_looked_at_ = t;
   judge_stances(now);
@@ -160,18 +161,24 @@ void Findings::report_turned_camera(const Situation& now, const Eigen::Vector3d&
          tenths(degrees.x()) + ", " + tenths(degrees.y()) + ", " + tenths(degrees.z()));
 }
 
+bool Findings::Unmeasured::goes_on(Time now, Duration least) {
+  if (!since) since = now;
+  if (now - *since < least) return false;
+  stretches += std::exchange(reported, true) ? 0 : 1;
+  longest = std::max(longest, to_seconds(now - *since));
+  return true;
+}
+
+// A robot that stands is held by that.
+void Findings::judge_coasting(const Situation& now) {
+  constexpr double stands = 0.05;  // m/s
+  if (now.modality != Modality::coast || now.estimate.x.v.norm() < stands) return coasting_.end();
+  if (coasting_.goes_on(now.t, streams_period)) events_.state({now.t, {}, Reason::coasting, coasting_.longest, coasting_.stretches, {}});
+}
+
 void Findings::note_unmeasured(const Situation& now, const std::optional<Eigen::Vector3d>& along) {
-  if (!along) {
-    unmeasured_.since.reset();
-    unmeasured_.reported = false;
-    return;
-  }
-  if (!unmeasured_.since) unmeasured_.since = now.t;
-  const Duration lasted = now.t - *unmeasured_.since;
-  if (lasted < 3 * streams_period) return;
-  unmeasured_.stretches += unmeasured_.reported ? 0 : 1;
-  unmeasured_.reported = true;
-  unmeasured_.longest = std::max(unmeasured_.longest, to_seconds(lasted));
+  if (!along) return unmeasured_.end();
+  if (!unmeasured_.goes_on(now.t, 3 * streams_period)) return;
   const auto axis = [&along](int i) { return decimals(std::abs((*along)[i]) < 0.05 ? 0.0 : (*along)[i], 1); };  // no "-0.0"
   events_.state({now.t, Sensor::lidar, Reason::unmeasured, unmeasured_.longest, unmeasured_.stretches,
                  "(" + axis(0) + ", " + axis(1) + ", " + axis(2) + ")"});

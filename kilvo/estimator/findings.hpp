@@ -79,6 +79,7 @@ class Findings {
   void judge_stances(const Situation& now);
   void judge_speed(const Situation& now);
   void judge_biases(const Situation& now);
+  void judge_coasting(const Situation& now);
 
   Statistics statistics_;
   EventLog events_;
@@ -96,8 +97,11 @@ class Findings {
     bool reported = false;  // this stretch
     double longest = 0;     // s
     std::uint64_t stretches = 0;
+    /// Of a stretch that goes on at `now`; true once it has lasted for `least`.
+    bool goes_on(Time now, Duration least);
+    void end() { since.reset(), reported = false; }
   };
-  Unmeasured unmeasured_;
+  Unmeasured unmeasured_, coasting_;
   std::uint64_t lost_stances_before_ = 0;
 };
 

@@ -70,6 +70,7 @@ enum class Reason : std::uint8_t {
   accel_clipped,
   feet_not_still,
   unmeasured,
+  coasting,
   map_begun_anew,
   state_thrown_away,
   not_where_predicted,
@@ -94,7 +95,7 @@ struct ReasonRow {
 
 inline constexpr std::array reasons = {
     ReasonRow{Reason::start, Severity::notice, "start", "start"},
-    ReasonRow{Reason::imu_lost, Severity::notice, "imu_lost", "imu lost"},
+    ReasonRow{Reason::imu_lost, Severity::warning, "imu_lost", "imu lost"},
     ReasonRow{Reason::imu_frozen, Severity::notice, "imu_frozen", "imu frozen"},
     ReasonRow{Reason::imu_back, Severity::notice, "imu_back", "imu is back"},
     ReasonRow{Reason::legs_lost, Severity::notice, "legs_lost", "legs lost"},
@@ -163,6 +164,11 @@ inline constexpr std::array reasons = {
         "for {} s no sensor measured the motion along [] of the odometry frame: the position along it is integrated from the IMU, and "
         "drifts. Legs or a camera would measure it",
         1, 0},
+    ReasonRow{
+        Reason::coasting, Severity::warning, "coasting",
+        "for {} s neither LiDAR nor legs measured the motion: the positions of that time are integrated from the IMU alone, and drift by "
+        "metres",
+        1, 1},
     ReasonRow{Reason::map_begun_anew, Severity::error, "map_begun_anew",
               "the map was restarted, because no sweep fitted it: poses before and after are in different frames"},
     ReasonRow{Reason::state_thrown_away, Severity::warning, "state_thrown_away",

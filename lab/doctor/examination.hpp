@@ -160,6 +160,7 @@ class Examination {
   bool acceleration_contradicts_legs(const std::string& evidence);
   // leg_mount.cpp, leg_zeros.cpp
   MountFit measure_leg_mount() const;
+  StanceFit standing_by(Robot& start, const MountFit& by_turning, double method) const;
   void examine_leg_rotation();
   void examine_leg_clock(const MountFit& fit, double method, double tolerance);
   bool turns_with_link(const LegHypothesis& other) const;

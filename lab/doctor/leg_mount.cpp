@@ -83,6 +83,28 @@ bool Examination::examine_leg_shape() {
   return true;
 }
 
+// `start`: with the mount that the fit has started from, the described one where feet can stand by it.
+StanceFit Examination::standing_by(Robot& start, const MountFit& by_turning, double method) const {
+  const bool turned = legs_turned() && by_turning.fit.good;
+  const double far = turned ? degrees((by_turning.R * robot_.imu.T_link_imu.R).Log().norm()) : 0;
+  constexpr double near = 15;  // degrees
+  if (leg_start_) {
+    start.imu.T_link_imu.R = *leg_start_;
+  } else if (far > near) {
+    start.imu.T_link_imu.R = by_turning.R.inverse();
+  }
+  const auto fit = [&] {
+    return lidar_way().empty() ? StanceFit()
+                               : fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, lidar_way(), gyro(),
+                                             turned && !leg_start_ ? by_turning.offset : leg_offset_);
+  };
+  StanceFit stances = fit();
+  // By a mount that is some degrees off they may not.
+  if (stances.good || leg_start_ || far > near || far <= std::max(leg_rotation_tolerance, sure * method)) return stances;
+  start.imu.T_link_imu.R = by_turning.R.inverse();
+  return fit();
+}
+
 void Examination::examine_leg_rotation() {
   const SO3 described = robot_.imu.T_link_imu.R.inverse();
   MountFit fit = measure_leg_mount();
@@ -91,17 +113,7 @@ void Examination::examine_leg_rotation() {
   double method = 0.2 + 10 * unexplained, clock_method = 0.001 + 0.04 * unexplained;  // degrees, s
   const LidarWay& way = lidar_way();
   Robot start = robot_;
-  const double far = degrees((fit.R * described.inverse()).Log().norm());
-  constexpr double near = 15;  // degrees
-  if (leg_start_) {
-    start.imu.T_link_imu.R = *leg_start_;
-  } else if (legs_turned() && fit.fit.good && far > near) {
-    start.imu.T_link_imu.R = fit.R.inverse();
-  }
-  StanceFit stances;
-  if (!way.empty())
-    stances = fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, way, gyro(),
-                          legs_turned() && fit.fit.good && !leg_start_ ? fit.offset : leg_offset_);
+  const StanceFit stances = standing_by(start, fit, method);
   if (!legs_turned() && !stances.good) {
     check(Sensor::legs, "mount of the IMU, clock", Check::Verdict::unknown, "the robot hardly turned: walk and turn");
     return;
@@ -155,7 +167,8 @@ void Examination::examine_leg_rotation() {
     }
   } else {
     seems_wrong(Sensor::imu) |= stances.good || accelerates ? angle > leg_rotation_tolerance : !way.empty();
-    check(Sensor::imu, "rotation of its mount on the robot", uncertain > 3 ? Check::Verdict::unknown : Check::Verdict::good, detail);
+    const bool is_open = uncertain > 3 || angle > std::max(leg_rotation_tolerance, sure * uncertain);
+    check(Sensor::imu, "rotation of its mount on the robot", is_open ? Check::Verdict::unknown : Check::Verdict::good, detail);
   }
   if (stances.good || accelerates) fit.explained = 1;  // the feet stand
   examine_leg_clock(fit, clock_method, stances.good ? leg_clock_tolerance : alone_leg_clock_tolerance);

@@ -49,7 +49,7 @@ void Recorder::count_return(double t, const std::vector<double>& positions) {
   for (std::size_t i = 0; comparable && std::abs(t - first.t) < at_once && i < positions.size(); ++i) {
     const double there = middle.position[i] - first.position[i], back = positions[i] - middle.position[i];
     const double size = std::min(std::abs(there), std::abs(back));
-    if (size < jump || std::abs(there + back) > 0.25 * size) continue;
+    if (!(size >= jump && std::abs(there + back) <= 0.25 * size)) continue;
     returned = true;
     if (size < returns.largest) continue;
     returns.largest = size;

@@ -118,6 +118,20 @@ TEST_F(Run, ARobotThatStandsOrAGapOfTheImuIsNotUnmeasured) {
   EXPECT_EQ(paused.code, 0) << paused.err;
 }
 
+// Half of it is measured; what a lost LiDAR leaves to the IMU is found again in the map, or never.
+TEST_F(Run, AnEndThatNothingMeasuresIsAFailureAndALossBeforeIsAWarning) {
+  const SmallWalk longer = small_walk(12);
+  record(longer.measurements);
+  const Finished bridged = run({"--drop", "lidar:6-8.5"});
+  EXPECT_EQ(bridged.code, 0) << bridged.err;
+  EXPECT_THAT(bridged.err, HasSubstr("neither LiDAR nor legs measured the motion"));
+  const Finished ended = run({"--drop", "lidar:7.5-"});
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_THAT(ended.err, HasSubstr("s neither LiDAR nor legs measured the motion: the positions of that time are integrated from the IMU alone "
+                                   "(--duration leaves them out)"));
+  EXPECT_EQ(run({"--drop", "lidar:7.5-", "--duration", "7.5"}).code, 0);
+}
+
 TEST_F(Run, DroppedScansAreCountedAndBridged) {
   ASSERT_EQ(run({"--drop", "lidar:2-3", "--drop", "lidar:3.75-"}).code, 0);
   const auto lidar = summary()["messages"]["lidar"];
