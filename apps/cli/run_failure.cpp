@@ -20,11 +20,11 @@ std::string failure_of(const RunSummary& run_summary, const Estimator& estimator
   if (run_summary.sweeps() > 0 || legs_used) {
     // After an outage the robot is found again; but most of such a trajectory is of nothing but the IMU.
     constexpr double at_end = 3;  // s
-    if (const double seconds = run_summary.unmeasured_seconds_at_end(); seconds > at_end)
+    if (run_summary.unmeasured_seconds_at_end() > at_end)
       return fmt::format(
           "in the last {:.1f} s neither LiDAR nor legs measured the motion: the positions of that time are integrated from the IMU alone "
           "(--duration leaves them out)",
-          seconds);
+          run_summary.coasting_seconds_at_end());
     if (2 * run_summary.unmeasured_seconds() <= run_summary.output_seconds()) return "";
     return fmt::format(
         "in {:.1f} of {:.1f} s neither LiDAR nor legs measured the motion: the positions of that time are integrated from the IMU alone",

@@ -51,12 +51,15 @@ void RunSummary::add(const Output& output) {
 void RunSummary::count_seconds(const Output& output, double dt) {
   modality_seconds_[name_of(output.modality)] += dt;
   constexpr double gap = 0.1, stands = 0.05;  // s, m/s
+  const bool coasts = output.modality == Modality::coast;
+  if (!coasts) coasting_at_end_ = unmeasured_at_end_ = 0;
   if (dt > gap) return;
   output_seconds_ += dt;
   // A robot that stands is held by that.
-  const bool is_unmeasured = output.modality == Modality::coast && output.x.v.norm() > stands;
-  unmeasured_ += is_unmeasured ? dt : 0;
-  unmeasured_at_end_ = output.modality == Modality::coast ? unmeasured_at_end_ + (is_unmeasured ? dt : 0) : 0;
+  const double unmeasured = coasts && output.x.v.norm() > stands ? dt : 0;
+  unmeasured_ += unmeasured;
+  unmeasured_at_end_ += unmeasured;
+  coasting_at_end_ += coasts ? dt : 0;
 }
 
 void RunSummary::count_touchdowns(const Contacts& contacts) {

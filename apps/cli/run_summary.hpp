@@ -61,7 +61,8 @@ class RunSummary {
   const std::map<std::string, double>& modality_seconds() const { return modality_seconds_; }
   /// While the robot moved and neither LiDAR nor legs measured that: of output_seconds().
   double unmeasured_seconds() const { return unmeasured_; }
-  /// The last of these, if nothing has measured the motion since.
+  /// Since LiDAR or legs measured the motion last; and of these, while the robot moved.
+  double coasting_seconds_at_end() const { return coasting_at_end_; }
   double unmeasured_seconds_at_end() const { return unmeasured_at_end_; }
   double output_seconds() const { return output_seconds_; }
   /// Why the trajectory cannot be right; empty when nothing speaks against it.
@@ -76,7 +77,7 @@ class RunSummary {
   std::optional<StampedState> first_, last_, last_on_path_;
   double path_length_ = 0;
   std::map<std::string, double> modality_seconds_;
-  double output_seconds_ = 0, unmeasured_ = 0, unmeasured_at_end_ = 0;  // s, without gaps of the outputs
+  double output_seconds_ = 0, unmeasured_ = 0, unmeasured_at_end_ = 0, coasting_at_end_ = 0;  // s, without gaps of the outputs
   std::string absurdity_;
   std::array<bool, 2> on_ = {true, true};
   std::array<std::uint64_t, 2> contact_events_ = {0, 0};

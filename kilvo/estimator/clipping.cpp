@@ -28,9 +28,9 @@ bool is_usual_accel(double accel) {
 
 }  // namespace
 
-// A motion that turns round has more values just below its largest than as large ones: in steps of 16 bits its largest comes again.
+// A motion that turns round has more values a little below its largest (`near`) than as large ones (`at`), however coarse the steps.
 bool ClippingDetector::count_at(Range::End& end, double size, int by_chance) {
-  constexpr double beside = 5e-3;
+  constexpr double beside = 0.02;
   if (is_near(size, end.largest, rounding)) return ++end.at > std::max(by_chance, end.near);
   if (size < end.largest) {
     end.near += is_near(size, end.largest, beside) ? 1 : 0;

@@ -67,7 +67,7 @@ struct EstimatorConfig {
         Field{"smooth_time", &EstimatorConfig::smooth_time, "s", "the smooth odometry takes two thirds of a correction in over this time"},
         Field{"gravity_align", &EstimatorConfig::gravity_align, "-", "z of the world is up; false: the world is the first IMU frame"},
         Field{"settling", &EstimatorConfig::settling, "-",
-              "legs: those that come back wait for a usual acceleration (paper, Section IV-E); none: they are used at once"},
+              "legs: legs that come back wait for a usual acceleration (paper, Section IV-E); none: they are used at once"},
         Field{"threads", &EstimatorConfig::threads, "-", "threads for sums over many points, 0: all cores; results do not depend on it"}};
   }
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kilvo/estimator/initialise.hpp"
 #include "kilvo/filter/stationarity.hpp"
@@ -81,6 +82,8 @@ Findings Findings::next_epoch() {
   next.used_before_.dropped = next.drops_;
   next.used_before_.unsupported = next.statistics_.unsupported;
   next.lost_stances_before_ = next.statistics_.lost_stances;
+  next.unmeasured_.stretches = unmeasured_.stretches;
+  next.coasting_.stretches = coasting_.stretches;
   ++next.statistics_.epochs;
   return next;
 }

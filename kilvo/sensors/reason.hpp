@@ -166,8 +166,8 @@ inline constexpr std::array reasons = {
         1, 0},
     ReasonRow{
         Reason::coasting, Severity::warning, "coasting",
-        "for {} s neither LiDAR nor legs measured the motion: the positions of that time are integrated from the IMU alone, and drift by "
-        "metres",
+        "for {} s neither LiDAR nor legs measured the motion: the positions of that time are integrated from the IMU alone, and drift "
+        "by metres in ten seconds",
         1, 1},
     ReasonRow{Reason::map_begun_anew, Severity::error, "map_begun_anew",
               "the map was restarted, because no sweep fitted it: poses before and after are in different frames"},

@@ -174,6 +174,9 @@ TEST(DescriptionWatch, FindsASecondPublisherOfTheJoints) {
       JointSample zeros = *legs;
       zeros.t += std::chrono::microseconds(200);
       std::ranges::fill(zeros.position, 0);
+      std::vector<std::string> names = zeros.names.list();  // in the order of the URDF, say
+      std::ranges::reverse(names);
+      zeros.names = names;
       watch.take(zeros);
     }
     return watch.finish();
@@ -186,6 +189,22 @@ TEST(DescriptionWatch, FindsASecondPublisherOfTheJoints) {
   ASSERT_EQ(seldom.size(), 1U);
   EXPECT_EQ(seldom[0].finding.cause, "joints_jump");
   EXPECT_FALSE(seldom[0].spoils || seldom[0].is_mendable);
+}
+
+// A finger is no part of the description.
+TEST(DescriptionWatch, HasNothingAgainstOtherJointsThatJump) {
+  bool there = false;
+  const auto rattle = [&there](Measurement& m, double) {
+    auto* legs = std::get_if<JointSample>(&m);
+    if (legs == nullptr) return;
+    std::vector<std::string> names = legs->names.list();
+    names.emplace_back("left_finger_joint");
+    legs->names = names;
+    legs->position.push_back((there = !there) ? 0.5 : 0);
+    if (!legs->velocity.empty()) legs->velocity.push_back(0);
+    if (!legs->effort.empty()) legs->effort.push_back(0);
+  };
+  EXPECT_THAT(watched(DescriptionWatch::Judging::here, rattle, 20), IsEmpty());
 }
 
 // Stamps that jump back by more than a second are those of another recording.

@@ -95,18 +95,26 @@ void Examination::examine_locked_joints() {
         true});
 }
 
-// A second publisher on the topic (the zeros of a joint_state_publisher, a simulation beside the robot), or an encoder that fails.
+// A second publisher on the topic (the zeros of a joint_state_publisher, a simulation beside the robot), or an encoder that fails. Not of
+// positions in degrees, whose noise may be as large.
 bool Examination::joints_jump() {
   constexpr std::size_t fewest = 10;
   constexpr double rare = 1e-3, few = 0.01;  // of the messages; with a few the legs can be judged all the same
-  const JointReturns& returns = recorded_.joint_returns;
-  const double share = static_cast<double>(returns.count) / std::max(1.0, static_cast<double>(returns.messages));
-  if (returns.count < fewest || share < rare) return false;
+  const auto has_unit = [](const Finding& f) { return f.cause == "joint_unit"; };
+  if (std::ranges::any_of(diagnosis_.findings, has_unit)) return false;
+  std::size_t joint = 0, count = 0;
+  for (const std::size_t i : recorded_legs_.joints_that_matter(robot_)) {
+    if (i >= recorded_.joint_returns.size() || recorded_.joint_returns[i].count <= count) continue;
+    count = recorded_.joint_returns[i].count;
+    joint = i;
+  }
+  const double share = static_cast<double>(count) / std::max(1.0, static_cast<double>(recorded_.joint_messages));
+  if (count < fewest || share < rare) return false;
   find(
       {Sensor::legs,
        "joints_jump",
-       fmt::format("joints jump and are back in the next message: {} of {} messages", returns.count, returns.messages),
-       fmt::format("{} by up to {:.2f} rad", returns.joint, returns.largest),
+       fmt::format("joints jump and are back in the next message: {} of {} messages", count, recorded_.joint_messages),
+       fmt::format("{} by up to {:.2f} rad", recorded_.joint_names[joint], recorded_.joint_returns[joint].largest),
        "only the robot's encoders may publish on the topic of the joints: look for another publisher (joint_state_publisher, a simulation)",
        share,
        "of the messages",

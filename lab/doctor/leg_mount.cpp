@@ -83,7 +83,7 @@ bool Examination::examine_leg_shape() {
   return true;
 }
 
-// `start`: with the mount that the fit has started from, the described one where feet can stand by it.
+// Sets the mount of `start` to the one that the fit began with: the described one, or that of the turning.
 StanceFit Examination::standing_by(Robot& start, const MountFit& by_turning, double method) const {
   const bool turned = legs_turned() && by_turning.fit.good;
   const double far = turned ? degrees((by_turning.R * robot_.imu.T_link_imu.R).Log().norm()) : 0;
@@ -93,16 +93,20 @@ StanceFit Examination::standing_by(Robot& start, const MountFit& by_turning, dou
   } else if (far > near) {
     start.imu.T_link_imu.R = by_turning.R.inverse();
   }
-  const auto fit = [&] {
-    return lidar_way().empty() ? StanceFit()
-                               : fit_stances(recorded_legs_, start, leg_mend_ ? &*leg_mend_ : nullptr, lidar_way(), gyro(),
-                                             turned && !leg_start_ ? by_turning.offset : leg_offset_);
+  if (lidar_way().empty()) return {};
+  const auto fit = [&](const Robot& robot) {
+    return fit_stances(recorded_legs_, robot, leg_mend_ ? &*leg_mend_ : nullptr, lidar_way(), gyro(),
+                       turned && !leg_start_ ? by_turning.offset : leg_offset_);
   };
-  StanceFit stances = fit();
-  // By a mount that is some degrees off they may not.
+  StanceFit stances = fit(start);
   if (stances.good || leg_start_ || far > near || far <= std::max(leg_rotation_tolerance, sure * method)) return stances;
-  start.imu.T_link_imu.R = by_turning.R.inverse();
-  return fit();
+  // By a mount that is some degrees off the feet may not stand.
+  Robot turned_by = start;
+  turned_by.imu.T_link_imu.R = by_turning.R.inverse();
+  const StanceFit by_turned = fit(turned_by);
+  if (!by_turned.good) return stances;
+  start = turned_by;
+  return by_turned;
 }
 
 void Examination::examine_leg_rotation() {

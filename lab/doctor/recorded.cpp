@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 namespace kilvo::lab {
 namespace {
@@ -10,6 +12,17 @@ constexpr std::size_t points_of_a_sweep = 6000;
 constexpr double leg_period = 0.0039;  // s
 constexpr double leg_step = 0.03;      // s between two stamps of a clock that the program finds
 constexpr float nearest_point = 0.5F;  // m: nearer points may be the robot's own arms
+
+// Another publisher may have another order, and more joints. None: it has not all of these.
+std::optional<std::vector<double>> in_order(const JointSample& sample, const std::vector<std::string>& names) {
+  std::vector<double> out;
+  for (const std::string& name : names) {
+    const auto i = static_cast<std::size_t>(std::ranges::find(sample.names, name) - sample.names.begin());
+    if (i >= sample.position.size()) return std::nullopt;
+    out.push_back(sample.position[i]);
+  }
+  return out.empty() ? std::nullopt : std::optional(std::move(out));
+}
 
 }  // namespace
 
@@ -40,22 +53,21 @@ void Recorder::take(const ImuSample& sample) {
 }
 
 void Recorder::count_return(double t, const std::vector<double>& positions) {
-  constexpr double at_once = 0.03, jump = 0.1;  // s, rad: a joint that oscillates so has 2000 rad/s^2 and more
-  JointReturns& returns = recorded_.joint_returns;
-  ++returns.messages;
+  constexpr double at_once = 0.03, jump = 0.1;  // s, rad: 900 rad/s^2 and more
+  ++recorded_.joint_messages;
+  recorded_.joint_returns.resize(positions.size());
   auto& [first, middle] = before_;
   const bool comparable = first.position.size() == positions.size() && middle.position.size() == positions.size();
-  bool returned = false;
-  for (std::size_t i = 0; comparable && std::abs(t - first.t) < at_once && i < positions.size(); ++i) {
+  // A message that is late shows where the joints were.
+  const bool in_order = first.t <= middle.t && middle.t <= t && t - first.t < at_once;
+  for (std::size_t i = 0; comparable && in_order && i < positions.size(); ++i) {
     const double there = middle.position[i] - first.position[i], back = positions[i] - middle.position[i];
     const double size = std::min(std::abs(there), std::abs(back));
     if (!(size >= jump && std::abs(there + back) <= 0.25 * size)) continue;
-    returned = true;
-    if (size < returns.largest) continue;
-    returns.largest = size;
-    returns.joint = i < recorded_.joint_names.size() ? recorded_.joint_names[i] : "";
+    JointReturns& returns = recorded_.joint_returns[i];
+    ++returns.count;
+    returns.largest = std::max(returns.largest, size);
   }
-  returns.count += returned ? 1 : 0;
   std::swap(first, middle);
   middle.t = t;
   middle.position = positions;
@@ -63,7 +75,11 @@ void Recorder::count_return(double t, const std::vector<double>& positions) {
 
 void Recorder::take(const JointSample& sample) {
   const double t = seconds(sample.t);
-  if (sample.names.list() == recorded_.joint_names) count_return(t, sample.position);
+  if (sample.names.list() == recorded_.joint_names) {
+    count_return(t, sample.position);
+  } else if (const auto ordered = in_order(sample, recorded_.joint_names)) {
+    count_return(t, *ordered);
+  }
   if (t - last_leg_ < leg_period && (t >= last_leg_ || (recorded_.reading.leg_clock_is_found && t > last_leg_ - leg_step))) return;
   if (!std::ranges::all_of(sample.position, [](double q) { return std::isfinite(q); })) return;
   if (recorded_.joint_names.empty()) recorded_.joint_names = sample.names;

@@ -36,12 +36,10 @@ struct LegSample {
   std::vector<double> velocity;  // may be empty
 };
 
-/// Messages that joints jump to, to come back in the next one, faster than any joint turns: readings of something else.
+/// Messages that a joint jumps to, to come back in the next one, faster than any joint turns: readings of something else.
 struct JointReturns {
-  std::size_t messages = 0;  // all
   std::size_t count = 0;
   double largest = 0;  // rad
-  std::string joint;   // that jumped by it
 };
 
 struct StampStatistics {
@@ -69,7 +67,8 @@ struct Recorded {
   std::vector<TrackedPair> tracks;         // of consecutive images
   int image_width = 0, image_height = 0;
   std::array<StampStatistics, sensor_count> stamps;
-  JointReturns joint_returns;
+  std::size_t joint_messages = 0;           // with these names
+  std::vector<JointReturns> joint_returns;  // of each joint
   Reading reading;
 };
 

@@ -118,7 +118,7 @@ TEST_F(Run, ARobotThatStandsOrAGapOfTheImuIsNotUnmeasured) {
   EXPECT_EQ(paused.code, 0) << paused.err;
 }
 
-// Half of it is measured; what a lost LiDAR leaves to the IMU is found again in the map, or never.
+// A LiDAR that comes back finds the robot in its map; at the end of a recording nothing does.
 TEST_F(Run, AnEndThatNothingMeasuresIsAFailureAndALossBeforeIsAWarning) {
   const SmallWalk longer = small_walk(12);
   record(longer.measurements);
