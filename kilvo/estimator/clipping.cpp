@@ -29,8 +29,9 @@ bool is_usual_accel(double accel) {
 }  // namespace
 
 // A motion that turns round has more values a little below its largest (`near`) than as large ones (`at`), however coarse the steps.
-bool ClippingDetector::count_at(Range::End& end, double size, int by_chance) {
+bool ClippingDetector::count_at(Range::End& end, double size) {
   constexpr double beside = 0.02;
+  constexpr int by_chance = 2;  // samples beside a peak
   if (is_near(size, end.largest, rounding)) return ++end.at > std::max(by_chance, end.near);
   if (size < end.largest) {
     end.near += is_near(size, end.largest, beside) ? 1 : 0;
@@ -40,7 +41,7 @@ bool ClippingDetector::count_at(Range::End& end, double size, int by_chance) {
   return false;
 }
 
-bool ClippingDetector::is_at_end(const Eigen::Vector3d& v, Range& range, double least, int by_chance, bool (*is_usual)(double)) {
+bool ClippingDetector::is_at_end(const Eigen::Vector3d& v, Range& range, double least, bool is_smooth, bool (*is_usual)(double)) {
   bool at_end = false;
   for (int i = 0; i < 3; ++i) {
     const double size = std::abs(v[i]);
@@ -50,16 +51,17 @@ bool ClippingDetector::is_at_end(const Eigen::Vector3d& v, Range& range, double 
     }
     if (size < least) continue;
     Range::End& end = range.ends[static_cast<std::size_t>(2 * i + (v[i] < 0 ? 1 : 0))];
-    const bool is_there = count_at(end, size, by_chance);
+    const bool is_there = is_smooth ? count_at(end, size) : is_near(size, end.largest);
+    end.largest = std::max(end.largest, size);
     at_end = at_end || is_there || (is_near(size, end.largest) && is_usual(size));
   }
   return at_end;
 }
 
-// Rates are smooth: two samples beside a peak may be the same. Of accelerations, which are rougher, only one is.
+// Rates are smooth: their largest comes again. Of accelerations, which are rougher, it does not.
 void ClippingDetector::mark(ImuSample& s) {
-  s.gyro_clipped = is_at_end(s.gyro, gyro_, least_gyro, 2, is_usual_gyro);
-  s.accel_clipped = is_at_end(s.accel, accel_, least_accel, 1, is_usual_accel);
+  s.gyro_clipped = is_at_end(s.gyro, gyro_, least_gyro, true, is_usual_gyro);
+  s.accel_clipped = is_at_end(s.accel, accel_, least_accel, false, is_usual_accel);
 }
 
 }  // namespace kilvo

@@ -1,5 +1,5 @@
-// Finds IMU samples at the end of the sensor's range: a setting, or found as the largest value of an axis where those of a
-// motion pile up, or that is usual.
+// Finds IMU samples at the end of the sensor's range: a setting, or found as the largest acceleration of an axis that comes again, the
+// largest rate at which values pile up, or one that is usual.
 #pragma once
 
 #include <array>
@@ -25,8 +25,8 @@ class ClippingDetector {
     };
     std::array<End, 6> ends{};  // by axis and sign
   };
-  static bool count_at(Range::End& end, double size, int by_chance);
-  static bool is_at_end(const Eigen::Vector3d& v, Range& range, double least, int by_chance, bool (*is_usual)(double));
+  static bool count_at(Range::End& end, double size);
+  static bool is_at_end(const Eigen::Vector3d& v, Range& range, double least, bool is_smooth, bool (*is_usual)(double));
 
   Range gyro_, accel_;
 };

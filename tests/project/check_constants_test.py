@@ -4,7 +4,7 @@ import unittest
 
 from planted_tree import PlantedTree
 
-LIMIT = 462
+LIMIT = 461
 
 
 class CheckConstants(PlantedTree):
