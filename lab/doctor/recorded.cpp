@@ -55,12 +55,12 @@ void Recorder::take(const ImuSample& sample) {
 void Recorder::count_return(double t, const std::vector<double>& positions) {
   constexpr double at_once = 0.03, jump = 0.1;  // s, rad: 900 rad/s^2 and more
   ++recorded_.joint_messages;
-  recorded_.joint_returns.resize(positions.size());
+  if (recorded_.joint_returns.size() < positions.size()) recorded_.joint_returns.resize(positions.size());
   auto& [first, middle] = before_;
   const bool comparable = first.position.size() == positions.size() && middle.position.size() == positions.size();
   // A message that is late shows where the joints were.
-  const bool in_order = first.t <= middle.t && middle.t <= t && t - first.t < at_once;
-  for (std::size_t i = 0; comparable && in_order && i < positions.size(); ++i) {
+  const bool is_in_time = first.t <= middle.t && middle.t <= t && t - first.t < at_once;
+  for (std::size_t i = 0; comparable && is_in_time && i < positions.size(); ++i) {
     const double there = middle.position[i] - first.position[i], back = positions[i] - middle.position[i];
     const double size = std::min(std::abs(there), std::abs(back));
     if (!(size >= jump && std::abs(there + back) <= 0.25 * size)) continue;
