@@ -105,11 +105,11 @@ bool SensorInputs::bring_onto_imu_clock(Input& input, Measurement& measurement, 
     const std::lock_guard lock(clocks_mutex_);
     clocks_.note(measurement, arrived);
     known = clocks_.knows(sensor);
-    if (known) clocks_.correct(measurement);
+    if (known) clocks_.correct(measurement, arrived);
     by = clocks_.offset(sensor);
     if (by && !input.moved) finding = clocks_.finding(sensor);
     if (!input.drifts) drift = clocks_.drift_finding(sensor);
-    if (sensor == Sensor::legs && std::exchange(input.clock_steps, clocks_.steps()) != clocks_.steps()) step = clocks_.step_finding();
+    if (const int steps = clocks_.steps(sensor); std::exchange(input.clock_steps, steps) != steps) step = clocks_.step_finding(sensor);
   }
   {
     const std::lock_guard lock(input.mutex);

@@ -19,6 +19,9 @@ constexpr Duration stretch = std::chrono::seconds(2);
 // Sensors whose clocks seem so near to each other have one and the same: what is between them are their delays. Devices that have
 // been switched on at different times differ by more.
 constexpr Duration one_clock = std::chrono::milliseconds(100);
+// The IMU comes often: so long shows whether its clock has stepped. One that is silent for longer tells nothing about the others.
+constexpr Duration imu_evidence = std::chrono::milliseconds(50), other_evidence = std::chrono::milliseconds(300);
+constexpr Duration imu_silence = std::chrono::milliseconds(500);
 // Stamps farther from the arrival are of no clock, s (beyond, differences are no times any more).
 constexpr double absurd = 4.5e9;
 
@@ -58,18 +61,57 @@ void SensorClocks::Stream::add(Time arrived, Duration delay) {
   while (delays.size() > fewest && arrived - delays.front().arrived > evidence) delays.pop_front();
 }
 
+SensorClocks::SensorClocks(const std::array<double, sensor_count>& time_offsets) : time_offsets_(time_offsets) { forget_steps(); }
+
 void SensorClocks::note(const Measurement& m, Time arrived) {
   const Sensor sensor = sensor_of(m);
   Stream& stream = streams_[index_of(sensor)];
   if (std::abs(to_seconds(arrived.time_since_epoch()) - to_seconds(stamp_of(m).time_since_epoch())) > absurd) return;
-  follow_drift(stream, arrived, arrived - stamp_of(m));
-  if (sensor == Sensor::legs) leg_steps_.note(stamp_of(m), arrived);
-  if (sensor == Sensor::imu) leg_steps_.note_imu(arrived - stamp_of(m));
+  follow_steps(sensor, stamp_of(m), arrived);
+  if (stream.steps.pending()) return;
+  const Duration correction = stream.steps.correction();
+  follow_drift(stream, arrived, arrived - stamp_of(m) - correction);
   if (is_given_up_ || stream.is_judged) return;
-  stream.add(arrived, arrived - completion_of(m));
+  stream.add(arrived, arrived - completion_of(m) - correction);
   for (const Sensor other : all_sensors) {
-    if (!knows(other) && (other == sensor || sensor == Sensor::imu)) judge(other, arrived);
+    if (is_to_be_judged(other) && (other == sensor || sensor == Sensor::imu)) judge(other, arrived);
   }
+}
+
+void SensorClocks::give_up() {
+  is_given_up_ = true;
+  for (Stream& stream : streams_) stream.steps.interrupt();
+}
+
+void SensorClocks::follow_steps(Sensor s, Time stamp, Time arrived) {
+  StampSteps& steps = streams_[index_of(s)].steps;
+  if (s == Sensor::imu) {
+    const auto jump = steps.pending();
+    const int count = steps.count();
+    steps.note(stamp, arrived);
+    if (steps.pending()) return;
+    if (steps.count() > count && is_replay(*jump)) forget_steps();
+    imu_arrived_ = arrived;
+    imu_delay_ = arrived - stamp - steps.correction();
+    for (Stream& stream : streams_) stream.unheard.reset();
+    return;
+  }
+  if (imu_arrived_ && arrived - *imu_arrived_ < imu_silence) return steps.note(stamp, arrived, imu_delay_);
+  // The clock of arrival may have stepped, which the IMU's next message shows, or the IMU is silent.
+  auto& since = streams_[index_of(s)].unheard;
+  if (!since) since = arrived;
+  if (arrived - *since > imu_silence) steps.interrupt();
+}
+
+// All go back together, by more than a clock does that is disciplined: a recording is played again, and has its own stamps.
+bool SensorClocks::is_replay(Duration imu_jump) const {
+  return imu_jump < -most_early && std::ranges::any_of(streams_, [imu_jump](const Stream& stream) {
+           return stream.steps.pending() && std::chrono::abs(*stream.steps.pending() - imu_jump) < one_clock;
+         });
+}
+
+void SensorClocks::forget_steps() {
+  for (const Sensor s : all_sensors) streams_[index_of(s)].steps = StampSteps(s == Sensor::imu ? imu_evidence : other_evidence);
 }
 
 void SensorClocks::follow_drift(Stream& stream, Time arrived, Duration delay) {
@@ -108,10 +150,10 @@ void SensorClocks::judge(Sensor s, Time arrived) {
   stream.offset = std::chrono::abs(set) < most_early ? clock : clock - set;
 }
 
-void SensorClocks::correct(Measurement& m) const {
+void SensorClocks::correct(Measurement& m, Time arrived) const {
   const Stream& stream = streams_[index_of(sensor_of(m))];
-  std::visit([&stream](auto& x) { x.t += stream.offset.value_or(Duration(0)) + stream.drift.correction(); }, m);
-  if (auto* legs = std::get_if<JointSample>(&m)) legs->t += leg_steps_.correction();
+  const Duration by = stream.offset.value_or(Duration(0)) + stream.drift.correction() + stream.steps.correction_at(arrived);
+  std::visit([by](auto& x) { x.t += by; }, m);
 }
 
 std::string SensorClocks::finding(Sensor s) const {
@@ -123,12 +165,12 @@ std::string SensorClocks::finding(Sensor s) const {
          ".time_offset: " + std::to_string(time_offsets_[index_of(s)] + by) + " does the same";
 }
 
-std::string SensorClocks::step_finding() const {
-  if (leg_steps_.count() == 0) return {};
-  const double by = 1e3 * to_seconds(leg_steps_.correction());
-  return "legs: their clock was set while they sent, " + std::to_string(leg_steps_.count()) +
-         (leg_steps_.count() == 1 ? " time" : " times") + ": by the times of arrival their stamps are moved by " + std::to_string(by) +
-         " ms from then on. Synchronise the clocks before";
+std::string SensorClocks::step_finding(Sensor s) const {
+  const StampSteps& steps = streams_[index_of(s)].steps;
+  if (steps.count() == 0) return {};
+  return name_of(s) + std::string(": its clock was set while it sent, ") + std::to_string(steps.count()) +
+         (steps.count() == 1 ? " time" : " times") + ": by the times of arrival its stamps are moved by " +
+         std::to_string(to_seconds(steps.correction())) + " s from then on. Synchronise the clocks before";
 }
 
 std::string SensorClocks::drift_finding(Sensor s) const {

@@ -5,8 +5,8 @@
 // but for what each needs on its way. Where a sensor differs from the IMU by more than any way can take, its clock is another one, and
 // its stamps are moved by one constant onto the IMU's: so that its least delay is the IMU's. What jitters in the arrival does not enter. Of
 // several sensors with one such clock the one with the shortest way tells for all. Clocks that are not disciplined drift apart; that is
-// followed (ClockDrift). A clock of the legs that is set while the robot walks is followed as well (StampSteps); those of LiDAR and camera
-// the estimator finds by their motion.
+// followed (ClockDrift). A clock that is set while the robot walks is followed as well (StampSteps): that of the IMU against the times of
+// arrival, those of the others against the IMU's.
 #pragma once
 
 #include <algorithm>
@@ -24,23 +24,23 @@ namespace kilvo::lab {
 class SensorClocks {
  public:
   /// `time_offsets`: that the stamps have been given already, s, by Sensor.
-  explicit SensorClocks(const std::array<double, sensor_count>& time_offsets = {}) : time_offsets_(time_offsets) {}
+  explicit SensorClocks(const std::array<double, sensor_count>& time_offsets = {});
 
   /// Each measurement in the order of arrival, before it is used.
   void note(const Measurement& m, Time arrived);
 
   /// Whether the clock of a sensor is known whose measurement has been noted. Otherwise it has to wait: most sensors are judged by one
-  /// message, those with another clock by a second of them.
-  bool knows(Sensor s) const { return s == Sensor::imu || is_given_up_ || streams_[index_of(s)].is_judged || !streams_[index_of(s)].first; }
+  /// message, those with another clock by a second of them; and a jump of the stamps by what comes after it.
+  bool knows(Sensor s) const { return is_given_up_ || (!streams_[index_of(s)].steps.pending() && !is_to_be_judged(s)); }
   bool knows_all() const {
     return std::ranges::all_of(all_sensors, [this](Sensor s) { return knows(s); });
   }
 
-  /// No more is waited for: sensors that are not judged yet have the IMU's clock.
-  void give_up() { is_given_up_ = true; }
+  /// No more is waited for: sensors that are not judged yet have the IMU's clock, and jumps are no steps.
+  void give_up();
 
-  /// Onto the IMU's clock, of a sensor that is known.
-  void correct(Measurement& m) const;
+  /// Onto the IMU's clock, of a sensor that is known, and as the IMU's was at first.
+  void correct(Measurement& m, Time arrived) const;
 
   /// What is added to the sensor's stamps; nothing where they are of the IMU's clock.
   const std::optional<Duration>& offset(Sensor s) const { return streams_[index_of(s)].offset; }
@@ -48,9 +48,9 @@ class SensorClocks {
   std::string finding(Sensor s) const;
   /// The same of a clock that drifts against the IMU's. Empty where none is known to.
   std::string drift_finding(Sensor s) const;
-  /// The same of the legs' clock, which was set so many times: empty where it was not.
-  int steps() const { return leg_steps_.count(); }
-  std::string step_finding() const;
+  /// The same of a clock that was set so many times: empty where it was not.
+  int steps(Sensor s) const { return streams_[index_of(s)].steps.count(); }
+  std::string step_finding(Sensor s) const;
 
  private:
   struct Delay {
@@ -67,15 +67,22 @@ class SensorClocks {
     std::optional<Duration> least;  // delay in this stretch
     ClockDrift drift;
     double known_drift = 0;  // the newest that was not 0
+    StampSteps steps;
+    std::optional<Time> unheard;  // since when messages of this sensor arrive, and none of the IMU
   };
+  void follow_steps(Sensor s, Time stamp, Time arrived);
+  bool is_replay(Duration imu_jump) const;
+  void forget_steps();
+  bool is_to_be_judged(Sensor s) const { return s != Sensor::imu && !streams_[index_of(s)].is_judged && streams_[index_of(s)].first; }
   void judge(Sensor s, Time arrived);
   void follow_drift(Stream& stream, Time arrived, Duration delay);
 
   std::array<double, sensor_count> time_offsets_;
   std::array<Stream, sensor_count> streams_;
   bool is_given_up_ = false;
-  std::optional<Time> stretch_;  // when it began
-  StampSteps leg_steps_;
+  std::optional<Time> stretch_;      // when it began
+  std::optional<Time> imu_arrived_;  // the newest one whose clock is known
+  Duration imu_delay_{};             // of that, from its stamp
 };
 
 }  // namespace kilvo::lab

@@ -1,5 +1,6 @@
 #include "lab/clocks/sensor_clocks.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <gmock/gmock.h>
@@ -73,7 +74,7 @@ Result result_of(SensorClocks& clocks, const std::vector<Robot::Arrival>& arriva
       ++out.withheld[i];
       continue;
     }
-    clocks.correct(m);
+    clocks.correct(m, a.at);
     const double error = to_seconds(stamp_of(m) - (a.measured + imu_clock));
     out.worst[i] = out.given[i] == 0 ? error : std::max(out.worst[i], error);
     out.least[i] = out.given[i]++ == 0 ? error : std::min(out.least[i], error);
@@ -237,7 +238,7 @@ TEST(SensorClocks, ThatDriftAreFollowed) {
     for (const auto& a : drifting(robot, ppm)) {
       Measurement m = a.m;
       clocks.note(m, a.at);
-      clocks.correct(m);
+      clocks.correct(m, a.at);
       const double true_stamp = to_seconds(a.measured - day) * (1 + 1e-6 * imu);
       const double error = std::abs(to_seconds(stamp_of(m) - day) - true_stamp);
       if (m.index() == 1) worst = std::max(worst, error);
@@ -267,6 +268,83 @@ TEST(SensorClocks, ThatDriftAreFollowedThroughAPauseAndAStepOfTheDelay) {
   go(6000, 0.02);
   EXPECT_NEAR(drift.rate(), 5e-5, 1e-6);
   EXPECT_NEAR(to_seconds(drift.correction()), -5e-5 * 6000, 8e-3);
+}
+
+// A LiDAR with its IMU that finds its PTP master, a computer that finds its time server.
+TEST(SensorClocks, ThatAreSetWhileTheySendAreFollowed) {
+  Robot robot;
+  robot.length = seconds(10);
+  constexpr std::array<int, sensor_count> most_withheld{14, 180, 6, 6};
+  const std::vector<std::vector<std::size_t>> together{{0}, {1}, {2}, {3}, {0, 2}, {1, 3}, {0, 1, 2, 3}};
+  for (const Duration step : {Duration(milliseconds(300)), Duration(-milliseconds(300)), Duration(seconds(60)), -to_uptime}) {
+    for (const auto& sensors : together) {
+      SCOPED_TRACE(testing::Message() << to_seconds(step) << " s, " << sensors.size() << " from " << sensors.front());
+      auto arrivals = robot.arrivals();
+      for (auto& a : arrivals) {
+        if (std::ranges::count(sensors, a.m.index()) > 0 && a.measured > day + seconds(5))
+          std::visit([step](auto& x) { x.t += step; }, a.m);
+      }
+      SensorClocks clocks;
+      const Result result = result_of(clocks, arrivals, Duration(0));
+      for (const Sensor s : all_sensors) {
+        const std::size_t i = index_of(s);
+        EXPECT_EQ(clocks.steps(s), std::ranges::count(sensors, i)) << name_of(s);
+        EXPECT_LT(std::max(result.worst[i], -result.least[i]), 4e-3) << name_of(s) << ": the jitter of the delays is 3 ms";
+        EXPECT_LE(result.withheld[i], most_withheld[i]) << name_of(s);
+      }
+    }
+  }
+}
+
+// What the recorder's computer has for its clock is set: the stamps that go on are right, and those that are of the same computer are not.
+TEST(SensorClocks, ThatAreSetWithTheClockOfArrivalAreToldFromThoseThatGoOn) {
+  for (const bool legs_too : {false, true}) {
+    Robot robot;
+    robot.length = seconds(10);
+    auto arrivals = robot.arrivals();
+    // Those before the IMU's next message are 60 s ahead, which the estimator refuses.
+    std::erase_if(arrivals, [](const auto& a) { return a.m.index() == 1 && a.at >= day + seconds(5) && a.at < day + milliseconds(5008); });
+    for (auto& a : arrivals) {
+      if (a.at < day + seconds(5)) continue;
+      if (legs_too && a.m.index() == 1) std::visit([](auto& x) { x.t += seconds(60); }, a.m);
+      a.at += seconds(60);
+    }
+    SensorClocks clocks;
+    const Result result = result_of(clocks, arrivals, Duration(0));
+    EXPECT_EQ(clocks.steps(Sensor::legs), legs_too ? 1 : 0);
+    EXPECT_EQ(clocks.steps(Sensor::imu) + clocks.steps(Sensor::lidar) + clocks.steps(Sensor::camera), 0);
+    EXPECT_LT(std::max(result.worst[1], -result.least[1]), 4e-3);
+  }
+}
+
+TEST(SensorClocks, OfARecordingThatIsPlayedAgainAreItsOwn) {
+  Robot robot;
+  robot.length = seconds(10);
+  auto arrivals = robot.arrivals();
+  const std::size_t length = arrivals.size();
+  for (std::size_t i = 0; i < length; ++i) {
+    auto again = arrivals[i];
+    again.at += seconds(10);
+    arrivals.push_back(again);
+  }
+  std::ranges::stable_sort(arrivals, {}, &Robot::Arrival::at);
+  SensorClocks clocks;
+  EXPECT_EQ(result_of(clocks, arrivals, Duration(0)).worst[0], 0);
+  for (const Sensor s : all_sensors) EXPECT_EQ(clocks.steps(s), 0) << name_of(s);
+}
+
+// For four seconds, in which the clock of the legs may have been set, or that of all the others.
+TEST(SensorClocks, OfTheLegsAreNotJudgedWhileTheImuIsSilent) {
+  Robot robot;
+  robot.length = seconds(10);
+  auto arrivals = robot.arrivals();
+  std::erase_if(arrivals, [](const auto& a) { return a.m.index() == 0 && a.measured > day + seconds(4) && a.measured < day + seconds(8); });
+  for (auto& a : arrivals) {
+    if (a.m.index() == 1 && a.measured > day + seconds(5)) std::visit([](auto& x) { x.t += milliseconds(150); }, a.m);
+  }
+  SensorClocks clocks;
+  result_of(clocks, arrivals, Duration(0));
+  EXPECT_EQ(clocks.steps(Sensor::legs), 0);
 }
 
 TEST(SensorClocks, ADriftOfAnotherRecordingIsForgotten) {
@@ -299,7 +377,7 @@ TEST(SensorClocks, DelaysThatStepOrGrowIntoAQueueAreNoDrift) {
     for (const auto& a : arrivals) {
       Measurement m = a.m;
       clocks.note(m, a.at);
-      clocks.correct(m);
+      clocks.correct(m, a.at);
       ASSERT_EQ(stamp_of(m), stamp_of(a.m));
     }
     EXPECT_EQ(clocks.drift_finding(Sensor::legs), "");

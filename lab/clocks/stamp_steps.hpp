@@ -1,5 +1,5 @@
-// Steps of a sensor's clock: a computer that finds its time server while the robot walks sets its clock at once, by milliseconds or
-// hours. The stamps jump from one message to the next, and the times of arrival do not.
+// Steps of a sensor's clock: a computer that finds its time server while the robot walks, or a LiDAR that finds its PTP master, sets its
+// clock at once, by milliseconds or decades. The stamps jump from one message to the next, and another clock shows no such jump.
 #pragma once
 
 #include <cstddef>
@@ -13,33 +13,42 @@ namespace kilvo::lab {
 
 class StampSteps {
  public:
-  /// Each message of the sensor, in the order of arrival.
-  void note(Time stamp, Time arrived);
-  /// Each one of the IMU, from its stamp to its arrival. A step of its clock as well is none between the two.
-  void note_imu(Duration delay);
+  /// How long the messages after a jump are observed (six times as long after one back by over two seconds); at least three of them.
+  explicit StampSteps(Duration observed_for = std::chrono::milliseconds(300)) : observed_for_(observed_for) {}
 
-  /// To be added to the sensor's stamps from now on.
+  /// Each message of the sensor, in the order of arrival. The other clock is that of arrival, or the IMU's where its newest message is
+  /// given that arrived so long after its stamp.
+  void note(Time stamp, Time arrived, Duration imu_delay = {});
+  /// The other clock is not known for a while: what was observed is not held against what comes then.
+  void interrupt();
+
+  /// The jump that is being observed: whether the clock stepped by it shows in the messages after it.
+  std::optional<Duration> pending() const { return jump_ ? std::optional(jump_->by) : std::nullopt; }
+  /// To be added to the stamp of a message that arrived then; and to those from now on.
+  Duration correction_at(Time arrived) const { return arrived < since_ ? correction_before_ : correction_; }
   Duration correction() const { return correction_; }
   /// How many steps there were.
   int count() const { return count_; }
 
  private:
   struct Message {
-    Time stamp, arrived;
+    Time stamp, then;  // by the other clock
   };
-  /// The stamps jumped; whether the clock did is seen by the delays afterwards.
   struct Jump {
-    Duration by, imu_before;
+    Duration by;
     Time arrived;
-    std::vector<Duration> delays, of_imu;
+    std::vector<Duration> delays;
   };
   void conclude();
 
-  std::deque<Duration> delays_, of_imu_;  // of the last messages before a jump
+  Duration observed_for_;
+  std::deque<Duration> delays_;    // of the last messages before a jump, corrected
+  std::optional<Duration> least_;  // of all messages but those after a jump, corrected
   std::optional<Message> last_;
   double scatter_ = 0;  // s, of the intervals between stamps against those between arrivals: mean of the magnitude
   std::optional<Jump> jump_;
-  Duration correction_{};
+  Duration correction_{}, correction_before_{};
+  Time since_ = Time::min();  // arrival of the first message after the last step
   int count_ = 0;
 };
 

@@ -38,11 +38,12 @@ struct Stream {
   }
   StampSteps after() const {
     StampSteps steps;
+    Duration imu_delay{};
     for (const Message& m : messages()) {
       const Time arrived = day + from_seconds(m.arrived);
-      const double stamp = m.t + (m.is_imu ? imu_ahead(m.t) : legs_ahead(m.t));
-      if (m.is_imu) steps.note_imu(arrived - day - from_seconds(stamp));
-      if (!m.is_imu) steps.note(day + from_seconds(stamp), arrived);
+      const Time stamp = day + from_seconds(m.t + (m.is_imu ? imu_ahead(m.t) : legs_ahead(m.t)));
+      if (m.is_imu) imu_delay = arrived - stamp;
+      if (!m.is_imu) steps.note(stamp, arrived, imu_delay);
     }
     return steps;
   }
@@ -80,24 +81,10 @@ TEST(StampSteps, AreNoneOfMessagesThatWaitAreLostOrHaveOneWrongStamp) {
   EXPECT_EQ((Stream{.legs_ahead = by(0.3), .waits = bursts}.after().count()), 1);
 }
 
-// The legs go on for ten seconds: nothing of before is held against what the IMU sends then.
-TEST(StampSteps, AreNotKnownWhileTheImuIsSilent) {
-  Stream robot{.legs_ahead = by(0.15)};
-  StampSteps steps;
-  for (const Stream::Message& m : robot.messages()) {
-    const Time arrived = day + from_seconds(m.arrived);
-    if (!m.is_imu) steps.note(day + from_seconds(m.t + robot.legs_ahead(m.t)), arrived);
-    if (m.is_imu && (m.t < 4.9 || m.t > 9)) steps.note_imu(arrived - day - from_seconds(m.t));
-  }
-  EXPECT_EQ(steps.count(), 0);
-}
-
-TEST(StampSteps, OfAnotherRecordingAreForgotten) {
-  StampSteps steps = Stream{.legs_ahead = by(0.15)}.after();
-  ASSERT_EQ(steps.count(), 1);
-  steps.note(day, day);
-  EXPECT_EQ(steps.count(), 0);
-  EXPECT_EQ(steps.correction(), Duration(0));
+// What waited for a second is dropped: stamps jump ahead by a second, and come as late as they once did.
+TEST(StampSteps, AreNoneOfABacklogThatIsDropped) {
+  const auto backlog = [](double t) { return std::clamp(0.5 * (t - 2), 0.0, 1.0) * (t < 5 ? 1 : 0); };
+  EXPECT_EQ((Stream{.waits = backlog, .is_lost = [](double t) { return t > 4 && t < 5; }}.after().count()), 0);
 }
 
 }  // namespace stamp_steps_test

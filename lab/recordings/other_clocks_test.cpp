@@ -98,6 +98,21 @@ TEST(OtherClocks, LidarAndImuMayBeTheOnesWithTheirOwn) {
   EXPECT_THAT(expect_walk(folder / "two.bag", -years), ElementsAre(HasSubstr("legs: its stamps"), HasSubstr("camera: its stamps")));
 }
 
+// A LiDAR with its IMU that counts from its start until it finds a PTP master. Nothing is lost meanwhile.
+TEST(OtherClocks, ThatAreSetOnTheWayAreFollowedFromTheFirstMessageOn) {
+  const TemporaryFolder folder;
+  auto messages = walk();
+  for (Message& m : messages) {
+    const bool is_device = sensor_of(m.m) == Sensor::imu || sensor_of(m.m) == Sensor::lidar;
+    if (is_device && stamp_of(m.m) < tiny_begin + std::chrono::milliseconds(1500)) std::visit([](auto& x) { x.t -= years; }, m.m);
+  }
+  write(folder / "set.bag", messages);
+  EXPECT_THAT(expect_walk(folder / "set.bag", -years),
+              ElementsAre(HasSubstr("imu: its clock was set while it sent, 1 time"), HasSubstr("legs: its stamps"),
+                          AllOf(HasSubstr("lidar: its clock was set"), HasSubstr("moved by -1261440000.000000 s")),
+                          HasSubstr("camera: its stamps")));
+}
+
 TEST(OtherClocks, TimesOfRecordingThatAreAllEqualChangeNothing) {
   const TemporaryFolder folder;
   auto messages = walk();

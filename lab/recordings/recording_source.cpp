@@ -98,7 +98,7 @@ std::optional<Measurement> RecordingSource::next() {
   Measurement out = std::move(held_.front().measurement);
   recorded_ = held_.front().recorded;
   held_.pop_front();
-  clocks_.correct(out);
+  clocks_.correct(out, recorded_);
   return out;
 }
 
@@ -152,11 +152,10 @@ std::vector<std::string> RecordingSource::warnings() const {
     for (const std::string& text : intakes_[i].findings()) texts.push_back(topic + ": " + text);
   }
   for (const Sensor sensor : all_sensors) {
-    for (const std::string& text : {clocks_.finding(sensor), clocks_.drift_finding(sensor)}) {
+    for (const std::string& text : {clocks_.finding(sensor), clocks_.drift_finding(sensor), clocks_.step_finding(sensor)}) {
       if (!text.empty()) texts.push_back(text);
     }
   }
-  if (const std::string text = clocks_.step_finding(); !text.empty()) texts.push_back(text);
   if (options_.leg_clock) {
     const auto& clock = *options_.leg_clock;
     const auto text = clock.offset() ? std::to_string(1e3 * *clock.offset()) + " ms to the times of arrival" : std::string("not found");
