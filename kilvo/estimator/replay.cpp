@@ -9,7 +9,8 @@
 
 namespace kilvo {
 
-constexpr double correlation = 0.01;  // s, for which an IMU misses or gets wrong the same
+constexpr double correlation = 0.01;       // s, for which an IMU misses or gets wrong the same
+constexpr double told_by_its_ends = 0.25;  // s: in a longer gap the samples before and after do not determine the motion between them
 
 void Replay::add(const ImuSample& s) {
   note_usual(s);
@@ -62,17 +63,15 @@ ImuInterval Replay::interval_between(const ImuSample& a, const ImuSample& b, Tim
                accel2 = usual_.accel_variance.sum() + least_accel * least_accel;
   interval.more_gyro = gyro2 * gap;
   interval.more_accel = gap > blind_gap ? 0 : accel2 * gap;  // more is added after the prediction (inflate_covariance_over_gap)
-  constexpr double told_by_its_ends = 0.25;                  // s
   if (gap > told_by_its_ends) {
-    // The two samples do not determine the motion between them. The robot leans no farther, and keeps turning for a while: as it did on the
-    // whole, and as it does at either end.
+    // It keeps turning for a while: as it did on the whole, and as it does at either end.
     constexpr double keeps_turning = 2, at_an_end = 0.3;  // s, share
     const double kept = keeps_turning / gap * (1 - std::exp(-gap / keeps_turning));
     const Eigen::Vector3d up_I = x.R.inverse() * -x.g.normalized();
     const Eigen::Vector3d rate = (1 - 2 * at_an_end) * usual_.gyro_mean + at_an_end * (a.gyro + b.gyro) - x.bg;
     interval.more_gyro = 0;
     interval.gyro_begin = interval.gyro_end = x.bg + kept * rate.dot(up_I) * up_I;
-    interval.accel_begin = interval.accel_end = x.ba - x.R.inverse() * x.g;
+    interval.is_blind = true;
   }
   return interval;
 }
@@ -107,7 +106,11 @@ void Replay::predict_to(Estimate& e, Time until, Trajectory* record) const {
       interval.gyro_scale *= 1 - sweep_noise_.rotation;
       interval.velocity_scale *= 1 - sweep_noise_.position;
     }
-    carry(e, interval, feet, noise);
+    if (interval.is_blind) {
+      carry_blind(e, interval.end, interval.gyro_begin - e.x.bg, noise);
+    } else {
+      carry(e, interval, feet, noise);
+    }
     if (record != nullptr) record->push(e.t, e.x.pose(), e.x.v);
   };
   // The first sample after e.t.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "kilvo/filter/predict.hpp"
 #include "kilvo/filter/state.hpp"
 #include "kilvo/sensors/time.hpp"
 
@@ -18,6 +19,10 @@ inline bool is_silence(Duration since, double rate) {
   constexpr double periods = 3;
   return since > std::max(least, from_seconds(periods / rate));
 }
+
+/// Moves the estimate to `end` where the IMU did not measure: the body turns at `rate` (rad/s), and its velocity, which wanders about standing
+/// still (Ornstein-Uhlenbeck process), is forgotten within seconds. Without what it may have done beyond that (inflate_covariance_over_gap).
+void carry_blind(Estimate& e, Time end, const Eigen::Vector3d& rate, const ProcessNoise& noise);
 
 /// Adds to the covariance what a walking robot may have done in the part [begin, end] of a gap of `gap` s.
 void inflate_covariance_over_gap(Estimate& e, Time begin, Time end, double gap);

@@ -29,12 +29,47 @@ TEST(GapInflation, LeavesACovarianceThatGrowsWithTheGap) {
   }
 }
 
+Estimate walking() {
+  Estimate e = standing();
+  e.x.v = {1, 0.2, 0};
+  e.P(at::v, at::v) = 0.01;
+  e.P(at::p, at::v) = e.P(at::v, at::p) = 1e-5;
+  return e;
+}
+
+void cross(Estimate& e, double begin, double end, double gap) {
+  carry_blind(e, at_seconds(end), {0, 0, 0.3}, {});
+  inflate_covariance_over_gap(e, at_seconds(begin), at_seconds(end), gap);
+}
+
 TEST(GapInflation, OfTwoPartsIsThatOfTheWhole) {
-  Estimate whole = standing(), parts = standing();
-  inflate_covariance_over_gap(whole, at_seconds(0), at_seconds(0.6), 0.6);
-  inflate_covariance_over_gap(parts, at_seconds(0), at_seconds(0.2), 0.6);
-  inflate_covariance_over_gap(parts, at_seconds(0.2), at_seconds(0.6), 0.6);
+  Estimate whole = walking(), parts = walking();
+  cross(whole, 0, 0.6, 0.6);
+  cross(parts, 0, 0.2, 0.6);
+  cross(parts, 0.2, 0.6, 0.6);
+  EXPECT_LT((whole.x.p - parts.x.p).norm() + (whole.x.v - parts.x.v).norm(), 1e-12);
   EXPECT_LT((whole.P - parts.P).norm(), 1e-12);
+}
+
+// After a minute a robot that walked is about where it stopped to be seen, and the covariance says within metres.
+TEST(GapInflation, ALongGapForgetsTheVelocity) {
+  Estimate e = walking();
+  cross(e, 0, 60, 60);
+  EXPECT_NEAR(e.x.p.x(), 2, 1e-6);
+  EXPECT_LT(e.x.v.norm(), 1e-9);
+  EXPECT_NEAR(std::sqrt(e.P(at::p, at::p)), 0.7 * 2 * std::sqrt(57.0), 0.1);
+  EXPECT_NEAR(std::sqrt(e.P(at::v, at::v)), 0.7, 1e-3);
+  EXPECT_EQ(e.P, e.P.transpose());
+}
+
+TEST(GapInflation, HasNoNegativeVarianceHoweverShortItsParts) {
+  for (const double dt : {1e-9, 1e-6, 1e-3, 0.0199, 0.0201}) {
+    Estimate e = standing();
+    e.P.setZero();
+    inflate_covariance_over_gap(e, at_seconds(0), at_seconds(dt), 1);
+    EXPECT_GE(e.P(at::p, at::p), 0) << dt;
+    EXPECT_GE(e.P(at::p, at::p) * e.P(at::v, at::v) * (1 + 1e-9), e.P(at::p, at::v) * e.P(at::p, at::v)) << dt;
+  }
 }
 
 TEST(GapInflation, TurnsMoreAboutTheVerticalThanItLeans) {

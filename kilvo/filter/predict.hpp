@@ -18,6 +18,7 @@ struct ImuInterval {
   double more_gyro = 0, more_accel = 0;    // beyond ProcessNoise, squared densities: what was missed or clipped, (rad/s)^2 s, (m/s^2)^2 s
   double gyro_scale = 1, velocity_scale = 1;  // multiply all of the rate's variance, and that of ProcessNoise::velocity
   bool made_biases = false;                   // at rest, and the biases are the means of these very samples
+  bool is_blind = false;                      // in a gap whose ends do not tell the motion: carry_blind
 
   /// The latest sample, held.
   static ImuInterval hold(const ImuSample& s, Time begin, Time end) { return {begin, end, s.gyro, s.gyro, s.accel, s.accel}; }
