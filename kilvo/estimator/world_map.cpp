@@ -128,6 +128,11 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
 }
 
 Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, History& history, Estimate& prior, PointDrops& drops) {
+  if (is_anew_ && surfaces_.empty()) {
+    // However uncertain the pose has become, it is the origin of all that this sweep begins.
+    error_.lost(prior.x.pose(), prior.P.topLeftCorner<6, 6>());
+    begin_frame(prior);
+  }
   const Estimate predicted = prior;
   Registration out;
   const auto go_on_with = [&](Attempt&& other) {
@@ -182,6 +187,7 @@ bool WorldMap::refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time en
 void WorldMap::begin_anew(const Estimate& e) {
   surfaces_ = VoxelMap(config_);
   prediction_ = {};
+  is_anew_ = true;
   // The robot may be anywhere within these.
   constexpr double moved = 5.0, climbed = 1.0, turned = 0.5;  // m, m, rad
   PoseCovariance unknown = PoseCovariance::Zero();

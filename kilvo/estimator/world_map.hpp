@@ -47,7 +47,8 @@ class WorldMap {
   }
   /// The first sweep: the pose there is wrong by so much more than the filter knows.
   void begin_at(const SE3& T_WI, const PoseCovariance& more) { error_.lost(T_WI, more); }
-  /// The robot is outside of the map, farther away than a search would have looked: the map restarts around `e`.
+  /// The robot is outside of the map, farther away than a search would have looked: the map restarts around `e`, and with its first sweep
+  /// the frame of the pose.
   void begin_anew(const Estimate& e);
 
  private:
@@ -86,7 +87,7 @@ class WorldMap {
   MapError error_;
   PredictionCheck prediction_;
   Motion usual_motion_;  // between sweeps, as the IMU predicts it: means of the last seconds
-  bool is_given_ = false;
+  bool is_given_ = false, is_anew_ = false;
   Time agreed_{};           // of the last sweep that did not contradict the prediction
   bool was_moved_ = false;  // the robot, before one that did: none since agreed with it
 };

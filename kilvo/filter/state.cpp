@@ -34,6 +34,23 @@ ErrorVector boxminus(const State& a, const State& b) {
   return d;
 }
 
+void begin_frame(Estimate& e) {
+  const Eigen::Vector3d up_W = -e.x.g.normalized(), up_I = e.x.R.inverse() * up_W;
+  // How the errors in the new frame depend on those in the old one: that of the heading turns the velocity and carries the feet along.
+  Covariance T = Covariance::Identity();
+  const Eigen::RowVector3d heading = up_I.transpose();
+  T.block<3, 3>(at::R, at::R) -= up_I * heading;
+  T.block<3, 3>(at::p, at::p).setZero();
+  T.block<3, 3>(at::v, at::R) = -up_W.cross(e.x.v) * heading;
+  for (const int foot : {0, 1}) {
+    const int pc = foot == 0 ? at::pcl : at::pcr;
+    T.block<3, 3>(pc, at::p) = -Eigen::Matrix3d::Identity();
+    T.block<3, 3>(pc, at::R) = -up_W.cross(e.x.pc[static_cast<std::size_t>(foot)] - e.x.p) * heading;
+  }
+  e.P = (T * e.P * T.transpose()).eval();
+  e.P = (0.5 * (e.P + e.P.transpose())).eval();
+}
+
 bool is_finite(const Estimate& e) {
   return e.x.R.matrix().allFinite() && e.x.p.allFinite() && e.x.v.allFinite() && e.x.bg.allFinite() && e.x.ba.allFinite() &&
          e.x.g.allFinite() && e.x.pc[0].allFinite() && e.x.pc[1].allFinite() && std::isfinite(e.x.tau) &&

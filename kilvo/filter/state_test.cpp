@@ -59,6 +59,31 @@ TEST(State, GravityKeepsItsLengthThroughManySteps) {
   EXPECT_NEAR(x.g.norm(), standard_gravity, 1e-11);
 }
 
+// A state that is off by d, turned about the vertical and moved so that it has the heading and the position of the estimate.
+TEST(State, AFrameThatBeginsHereKnowsHeadingAndPosition) {
+  test::Random random(5);
+  for (int i = 0; i < 100; ++i) {
+    Estimate e;
+    e.x = test::random_state(random);
+    const ErrorVector d = test::random_error(random, e.x, 1e-4);
+    e.P = d * d.transpose();
+    State truth = boxplus(e.x, d);
+    const Eigen::Vector3d up = -e.x.g.normalized();
+    const SO3 turn = SO3::Exp(-up.dot((truth.R * e.x.R.inverse()).Log()) * up);
+    const auto moved = [&, from = truth.p](const Eigen::Vector3d& p) { return Eigen::Vector3d(e.x.p + turn * (p - from)); };
+    truth.R = turn * truth.R;
+    truth.v = turn * truth.v;
+    for (Eigen::Vector3d& foot : truth.pc) foot = moved(foot);
+    truth.p = e.x.p;
+    const ErrorVector left = boxminus(truth, e.x);
+    begin_frame(e);
+    // To first order in d.
+    EXPECT_LT((e.P - left * left.transpose()).norm(), 1e-3 * left.squaredNorm()) << i;
+    EXPECT_LT((e.P.block<3, 3>(at::p, at::p).norm()), 1e-20);
+    EXPECT_EQ(e.P, e.P.transpose());
+  }
+}
+
 TEST(State, ANonFiniteNumberAnywhereIsFound) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(is_finite(Estimate{}));
