@@ -147,13 +147,13 @@ void History::inflate_velocity(double sigma) {
 }
 
 double History::roll_back() {
-  // The motion since is unknown.
+  // The motion since is unknown: the robot is assumed to have kept its velocity.
   const Time t = std::max(now_.t, good_.t);
   const double lost = to_seconds(t - good_.t);
   const double thrown = now_.x.v.allFinite() ? std::min(absurd_speed, (now_.x.v - good_.x.v).norm()) : absurd_speed;
-  const Time since = good_.t;
-  carry_blind(good_, t, Eigen::Vector3d::Zero(), replay_.noise_now());
-  inflate_covariance_over_gap(good_, since, t, std::max(lost, least_gap));
+  good_.x.p += lost * good_.x.v;
+  inflate_covariance_over_gap(good_, good_.t, t, std::max(lost, least_gap));
+  good_.t = t;
   // What made the velocity absurd may have begun before.
   good_.P.diagonal().segment<3>(at::v).array() += thrown * thrown;
   for (std::size_t side = 0; side < 2; ++side) end_stance(good_, side);

@@ -36,7 +36,6 @@ class Replay {
   ImuSample imu_at(Time t) const;
 
   /// Density of the accelerometer's noise as it is taken, m/s^2/sqrt(Hz): that of the settings, or more when the samples show it.
-  ProcessNoise noise_now() const;
   double accel_noise() const { return noise_now().accel; }
 
   /// All that are remembered.
@@ -113,6 +112,7 @@ class Replay {
   ImuInterval interval_between(const ImuSample& a, const ImuSample& b, Time begin, Time end, const State& x) const;
   StandingFeet standing_at(Time t) const;
   double longest_gap() const;  // between IMU samples, s
+  ProcessNoise noise_now() const;
   double expected_density2() const;  // of the accelerometer's second differences, by the settings
   bool aliases() const { return usual_.accel_density2 > 1.5 * expected_density2(); }
   bool uses_learnt_noise() const { return usual_.open || aliases(); }

@@ -12,6 +12,8 @@ constexpr double leaning = 0.06;  // rad
 // Its velocity: deviation along an axis, and the time in which it is forgotten (docs/decisions/imu-faults.md).
 constexpr double wandering = 0.7;  // m/s
 constexpr double memory = 2;       // s
+// Its steps move it to and fro beside that, as a random walk.
+constexpr double swaying = 0.1;  // m/sqrt(s)
 
 // What is left of a velocity after so long, and the way that it has made meanwhile per m/s.
 struct Left {
@@ -57,7 +59,7 @@ void inflate_covariance_over_gap(Estimate& e, Time begin, Time end, double gap) 
       share * (lean * lean * Eigen::Matrix3d::Identity() + std::max(0.0, turn * turn - lean * lean) * up_I * up_I.transpose());
   const double variance = wandering * wandering, way = Left(dt).way;
   e.P.diagonal().segment<3>(at::v).array() -= variance * std::expm1(-2 * dt / memory);
-  e.P.diagonal().segment<3>(at::p).array() += variance * memory * memory * way_variance(dt / memory);
+  e.P.diagonal().segment<3>(at::p).array() += variance * memory * memory * way_variance(dt / memory) + swaying * swaying * dt;
   e.P.diagonal(at::v - at::p).segment<3>(at::p).array() += variance * way * way / memory;
   e.P.diagonal(at::p - at::v).segment<3>(at::p).array() += variance * way * way / memory;
 }

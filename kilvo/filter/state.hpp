@@ -48,7 +48,7 @@ struct Estimate {
   Covariance P = Covariance::Zero();
 };
 
-/// The frame of position and heading begins anew at this pose: both are known exactly in it, and what depended on their errors is relative
+/// The frame of position and heading restarts at this pose: both are known exactly in it, and what depended on their errors is relative
 /// to them. Inclination, biases and the amount of the velocity keep theirs.
 void begin_frame(Estimate& e);
 

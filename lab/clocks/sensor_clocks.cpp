@@ -89,9 +89,9 @@ void SensorClocks::follow_steps(Sensor s, Time stamp, Time arrived) {
     const auto jump = steps.pending();
     const int count = steps.count();
     steps.note(stamp, arrived);
+    imu_arrived_ = arrived;
     if (steps.pending()) return;
     if (steps.count() > count && is_replay(*jump)) forget_steps();
-    imu_arrived_ = arrived;
     imu_delay_ = arrived - stamp - steps.correction();
     for (Stream& stream : streams_) stream.unheard.reset();
     return;

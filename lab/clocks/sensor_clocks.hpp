@@ -81,8 +81,8 @@ class SensorClocks {
   std::array<Stream, sensor_count> streams_;
   bool is_given_up_ = false;
   std::optional<Time> stretch_;      // when it began
-  std::optional<Time> imu_arrived_;  // the newest one whose clock is known
-  Duration imu_delay_{};             // of that, from its stamp
+  std::optional<Time> imu_arrived_;  // the newest one
+  Duration imu_delay_{};             // of the newest whose clock is known, from its stamp
 };
 
 }  // namespace kilvo::lab
