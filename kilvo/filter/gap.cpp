@@ -10,7 +10,7 @@ namespace {
 constexpr double turning = 0.4;   // rad/s
 constexpr double leaning = 0.06;  // rad
 // Its velocity: deviation along an axis, and the time in which it is forgotten (docs/decisions/imu-faults.md).
-constexpr double wandering = 0.7;  // m/s
+constexpr double wandering = 0.5;  // m/s
 constexpr double memory = 2;       // s
 // Its steps move it to and fro beside that, as a random walk.
 constexpr double swaying = 0.1;  // m/sqrt(s)
@@ -23,8 +23,7 @@ struct Left {
 
 // (2a - 3 + 4 exp(-a) - exp(-2a)), without the cancellation of small a.
 double way_variance(double a) {
-  constexpr double small = 0.01;
-  if (a < small) return a * a * a * (2.0 / 3 - a / 2);
+  if (a < 0.01) return a * a * a * (2.0 / 3 - a / 2);
   return 2 * a - 3 + 4 * std::exp(-a) - std::exp(-2 * a);
 }
 

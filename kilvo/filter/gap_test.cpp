@@ -57,8 +57,8 @@ TEST(GapInflation, ALongGapForgetsTheVelocity) {
   cross(e, 0, 60, 60);
   EXPECT_NEAR(e.x.p.x(), 2, 1e-6);
   EXPECT_LT(e.x.v.norm(), 1e-9);
-  EXPECT_NEAR(std::sqrt(e.P(at::p, at::p)), 0.7 * 2 * std::sqrt(57.0), 0.1);
-  EXPECT_NEAR(std::sqrt(e.P(at::v, at::v)), 0.7, 1e-3);
+  EXPECT_NEAR(std::sqrt(e.P(at::p, at::p)), 0.5 * 2 * std::sqrt(57.0), 0.1);
+  EXPECT_NEAR(std::sqrt(e.P(at::v, at::v)), 0.5, 1e-3);
   EXPECT_EQ(e.P, e.P.transpose());
 }
 
