@@ -21,7 +21,7 @@ constexpr Duration stretch = std::chrono::seconds(2);
 constexpr Duration one_clock = std::chrono::milliseconds(100);
 // The IMU comes often: so long shows whether its clock has stepped. One that is silent for longer tells nothing about the others.
 constexpr Duration imu_evidence = std::chrono::milliseconds(50), other_evidence = std::chrono::milliseconds(300);
-constexpr Duration imu_silence = std::chrono::milliseconds(500);
+constexpr Duration silence = std::chrono::milliseconds(500);
 // Stamps farther from the arrival are of no clock, s (beyond, differences are no times any more).
 constexpr double absurd = 4.5e9;
 
@@ -83,24 +83,29 @@ void SensorClocks::give_up() {
   for (Stream& stream : streams_) stream.steps.interrupt();
 }
 
-void SensorClocks::follow_steps(Sensor s, Time stamp, Time arrived) {
-  StampSteps& steps = streams_[index_of(s)].steps;
-  if (s == Sensor::imu) {
-    const auto jump = steps.pending();
-    const int count = steps.count();
-    steps.note(stamp, arrived);
-    imu_arrived_ = arrived;
-    if (steps.pending()) return;
-    if (steps.count() > count && is_replay(*jump)) forget_steps();
-    imu_delay_ = arrived - stamp - steps.correction();
-    for (Stream& stream : streams_) stream.unheard.reset();
-    return;
+void SensorClocks::follow_arrival(Sensor s, Time stamp, Time arrived) {
+  if (newest_ && *newest_ - arrived > one_clock) {  // another recording
+    set_ahead_ = Duration(0);
+    forget_steps();
   }
-  if (imu_arrived_ && arrived - *imu_arrived_ < imu_silence) return steps.note(stamp, arrived, imu_delay_);
-  // The clock of arrival may have stepped, which the IMU's next message shows, or the IMU is silent.
-  auto& since = streams_[index_of(s)].unheard;
-  if (!since) since = arrived;
-  if (arrived - *since > imu_silence) steps.interrupt();
+  if (newest_ && arrived - *newest_ > silence) is_arrival_unclear_ = true;
+  newest_ = arrived;
+  if (s != Sensor::imu) return;
+  const auto before = std::exchange(imu_, Message{stamp, arrived});
+  if (!std::exchange(is_arrival_unclear_, false) || !before) return;
+  const Duration went_on = stamp - before->stamp;
+  if (went_on > Duration(0) && went_on < silence) set_ahead_ += arrived - before->arrived - went_on;
+}
+
+void SensorClocks::follow_steps(Sensor s, Time stamp, Time arrived) {
+  follow_arrival(s, stamp, arrived);
+  StampSteps& steps = streams_[index_of(s)].steps;
+  if (is_arrival_unclear_) return;
+  if (!imu_ || arrived - imu_->arrived > silence) return steps.interrupt();
+  const auto jump = steps.pending();
+  const int count = steps.count();
+  steps.note(stamp, arrived, set_ahead_);
+  if (s == Sensor::imu && steps.count() > count && is_replay(*jump)) forget_steps();
 }
 
 // All go back together, by more than a clock does that is disciplined: a recording is played again, and has its own stamps.

@@ -5,8 +5,8 @@
 // but for what each needs on its way. Where a sensor differs from the IMU by more than any way can take, its clock is another one, and
 // its stamps are moved by one constant onto the IMU's: so that its least delay is the IMU's. What jitters in the arrival does not enter. Of
 // several sensors with one such clock the one with the shortest way tells for all. Clocks that are not disciplined drift apart; that is
-// followed (ClockDrift). A clock that is set while the robot walks is followed as well (StampSteps): that of the IMU against the times of
-// arrival, those of the others against the IMU's.
+// followed (ClockDrift). A clock that is set while the robot walks is followed as well, by the times of arrival (StampSteps). Where it is
+// the clock of arrival, nothing arrives for that time, and the IMU's stamps go on.
 #pragma once
 
 #include <algorithm>
@@ -68,8 +68,8 @@ class SensorClocks {
     ClockDrift drift;
     double known_drift = 0;  // the newest that was not 0
     StampSteps steps;
-    std::optional<Time> unheard;  // since when messages of this sensor arrive, and none of the IMU
   };
+  void follow_arrival(Sensor s, Time stamp, Time arrived);
   void follow_steps(Sensor s, Time stamp, Time arrived);
   bool is_replay(Duration imu_jump) const;
   void forget_steps();
@@ -80,9 +80,14 @@ class SensorClocks {
   std::array<double, sensor_count> time_offsets_;
   std::array<Stream, sensor_count> streams_;
   bool is_given_up_ = false;
-  std::optional<Time> stretch_;      // when it began
-  std::optional<Time> imu_arrived_;  // the newest one
-  Duration imu_delay_{};             // of the newest whose clock is known, from its stamp
+  std::optional<Time> stretch_;  // when it began
+  struct Message {
+    Time stamp, arrived;
+  };
+  std::optional<Message> imu_;       // the newest one
+  std::optional<Time> newest_;       // arrival of any message
+  bool is_arrival_unclear_ = false;  // nothing has arrived for a while, and no message of the IMU since
+  Duration set_ahead_{};             // by which the clock of arrival has been
 };
 
 }  // namespace kilvo::lab

@@ -335,6 +335,40 @@ TEST(SensorClocks, OfARecordingThatIsPlayedAgainAreItsOwn) {
   }
 }
 
+TEST(SensorClocks, OfAnotherRecordingAreForgotten) {
+  Robot robot;
+  robot.length = seconds(10);
+  auto arrivals = robot.arrivals();
+  for (auto& a : arrivals) {
+    if (a.m.index() == 1 && a.measured > day + seconds(5)) std::visit([](auto& x) { x.t += milliseconds(150); }, a.m);
+  }
+  SensorClocks clocks;
+  result_of(clocks, arrivals, Duration(0));
+  ASSERT_EQ(clocks.steps(Sensor::legs), 1);
+  const Result again = result_of(clocks, robot.arrivals(), Duration(0));
+  EXPECT_EQ(clocks.steps(Sensor::legs), 0);
+  EXPECT_EQ(again.worst[1], 0);
+}
+
+// An IMU whose messages wait for a third of a second for a while, as those of a busy computer do: no clock was set.
+TEST(SensorClocks, AreNotSetWhereTheImuComesLateForAWhile) {
+  for (const int late : {80, 300}) {
+    Robot robot;
+    robot.length = seconds(10);
+    auto arrivals = robot.arrivals();
+    for (auto& a : arrivals) {
+      if (a.m.index() == 0 && a.measured > day + seconds(4) && a.measured < day + seconds(5)) a.at += milliseconds(late);
+    }
+    std::ranges::stable_sort(arrivals, {}, &Robot::Arrival::at);
+    SensorClocks clocks;
+    const Result result = result_of(clocks, arrivals, Duration(0));
+    for (const Sensor s : all_sensors) {
+      EXPECT_EQ(clocks.steps(s), 0) << name_of(s);
+      EXPECT_EQ(result.worst[index_of(s)], 0) << name_of(s);
+    }
+  }
+}
+
 // For four seconds, in which the clock of the legs may have been set, or that of all the others.
 TEST(SensorClocks, OfTheLegsAreNotJudgedWhileTheImuIsSilent) {
   Robot robot;

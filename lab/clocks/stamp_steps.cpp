@@ -35,8 +35,8 @@ void StampSteps::interrupt() {
   last_.reset();
 }
 
-void StampSteps::note(Time stamp, Time arrived, Duration imu_delay) {
-  const Time then = arrived - imu_delay;
+void StampSteps::note(Time stamp, Time arrived, Duration set_ahead) {
+  const Time then = arrived - set_ahead;
   const Duration delay = then - stamp - correction_;
   const auto before = std::exchange(last_, Message{stamp, then});
   const Duration by = before ? (stamp - before->stamp) - (then - before->then) : Duration(0);

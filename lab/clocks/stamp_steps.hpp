@@ -16,9 +16,9 @@ class StampSteps {
   /// How long the messages after a jump are observed (six times as long after one back by over two seconds); at least three of them.
   explicit StampSteps(Duration observed_for = std::chrono::milliseconds(300)) : observed_for_(observed_for) {}
 
-  /// Each message of the sensor, in the order of arrival. The other clock is that of arrival, or the IMU's where its newest message is
-  /// given that arrived so long after its stamp.
-  void note(Time stamp, Time arrived, Duration imu_delay = {});
+  /// Each message of the sensor, in the order of arrival. The other clock is that of arrival, which has been set ahead by so much
+  /// meanwhile.
+  void note(Time stamp, Time arrived, Duration set_ahead = {});
   /// The other clock is not known for a while: what was observed is not held against what comes then.
   void interrupt();
 
