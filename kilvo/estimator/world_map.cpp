@@ -128,11 +128,7 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
 }
 
 Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, History& history, Estimate& prior, PointDrops& drops) {
-  if (is_anew_ && surfaces_.empty()) {
-    // However uncertain the pose has become, it is the origin of all that this sweep begins.
-    error_.lost(prior.x.pose(), prior.P.topLeftCorner<6, 6>());
-    begin_frame(prior);
-  }
+  begin_frame_at(prior);
   const Estimate predicted = prior;
   Registration out;
   const auto go_on_with = [&](Attempt&& other) {
@@ -182,6 +178,12 @@ bool WorldMap::refuse_sweep(LidarPipeline& lidar, const Estimate& prior, Time en
   if (!lidar.refuse(end, is_given_)) return false;
   begin_anew(prior);
   return true;
+}
+
+void WorldMap::begin_frame_at(Estimate& prior) {
+  if (!is_anew_ || !surfaces_.empty()) return;
+  error_.lost(prior.x.pose(), prior.P.topLeftCorner<6, 6>());
+  begin_frame(prior);
 }
 
 void WorldMap::begin_anew(const Estimate& e) {

@@ -50,6 +50,8 @@ class WorldMap {
   /// The robot is outside of the map, farther away than a search would have looked: the map restarts around `e`, and with its first sweep
   /// the frame of the pose.
   void begin_anew(const Estimate& e);
+  /// Before the first sweep of a map that has restarted: the pose, however uncertain it has become, is the origin of the frame.
+  void begin_frame_at(Estimate& prior);
 
  private:
   struct Attempt {

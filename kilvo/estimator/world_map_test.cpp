@@ -66,6 +66,28 @@ TEST(WorldMap, BegunAnewItIsEmptyAndTheUncertaintySaysSo) {
   }
 }
 
+// What the pose was uncertain by against the map before is the new map's error, and none against it.
+TEST(WorldMap, BegunAnewItBeginsAFrameWithItsFirstSweep) {
+  Estimate e = floor_sweep().posterior;
+  e.x.g = {0, 0, -standard_gravity};
+  e.P.diagonal().segment<3>(at::p).setConstant(10.0 * 10.0);
+  e.P(at::R + 2, at::R + 2) = 1;
+  const Covariance P = e.P;
+  WorldMap map = empty_world();
+  map.begin_frame_at(e);
+  EXPECT_EQ(e.P, P) << "the first map of all";
+  map.begin_anew(e);
+  map.begin_frame_at(e);
+  EXPECT_LT((e.P.block<3, 3>(at::p, at::p).norm()), 1e-12);
+  EXPECT_LT(e.P(at::R + 2, at::R + 2), 1e-12);
+  EXPECT_NEAR(e.P(at::R, at::R), P(at::R, at::R), 1e-12) << "gravity still says what is up";
+  EXPECT_NEAR(map.error_at(e.x.pose())(3, 3), 5.0 * 5.0 + 10.0 * 10.0, 1e-3);
+  map.learn(floor_sweep(), none(), true);
+  e.P = P;
+  map.begin_frame_at(e);
+  EXPECT_EQ(e.P, P) << "the second sweep";
+}
+
 // The new map's planes carry that error: however many sweeps are registered to them, they tell nothing of the one before.
 TEST(WorldMap, WhatIsRegisteredToANewMapStaysAsUncertainAsThat) {
   WorldMap map = empty_world();

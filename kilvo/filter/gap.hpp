@@ -20,8 +20,9 @@ inline bool is_silence(Duration since, double rate) {
   return since > std::max(least, from_seconds(periods / rate));
 }
 
-/// Moves the estimate to `end` where the IMU did not measure: the body turns at `rate` (rad/s), and its velocity, which wanders about standing
-/// still (Ornstein-Uhlenbeck process), is forgotten within seconds. Without what it may have done beyond that (inflate_covariance_over_gap).
+/// Moves the estimate to `end` where the IMU did not measure: the body turns at `rate` (rad/s), and its velocity, which wanders about
+/// standing still (Ornstein-Uhlenbeck process), is forgotten within seconds. Without what it may have done beyond that
+/// (inflate_covariance_over_gap).
 void carry_blind(Estimate& e, Time end, const Eigen::Vector3d& rate, const ProcessNoise& noise);
 
 /// Adds to the covariance what a walking robot may have done in the part [begin, end] of a gap of `gap` s.
