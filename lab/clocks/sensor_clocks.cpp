@@ -88,13 +88,22 @@ void SensorClocks::follow_arrival(Sensor s, Time stamp, Time arrived) {
     set_ahead_ = Duration(0);
     forget_steps();
   }
-  if (newest_ && arrived - *newest_ > silence) is_arrival_unclear_ = true;
+  if (imu_ && !is_arrival_unclear_ && arrived - *newest_ > silence) {
+    is_arrival_unclear_ = true;
+    heard_again_.reset();
+    delay_before_ = imu_->arrived - imu_->stamp;
+  }
   newest_ = arrived;
   if (s != Sensor::imu) return;
   const auto before = std::exchange(imu_, Message{stamp, arrived});
-  if (!std::exchange(is_arrival_unclear_, false) || !before) return;
-  const Duration went_on = stamp - before->stamp;
-  if (went_on > Duration(0) && went_on < silence) set_ahead_ += arrived - before->arrived - went_on;
+  if (!is_arrival_unclear_) return;
+  // Where the IMU's messages only waited, they come in a burst and then as ever.
+  if (!heard_again_) heard_again_ = arrived;
+  const Duration went_on = stamp - before->stamp, later = arrived - stamp - delay_before_;
+  is_arrival_unclear_ = went_on > Duration(0) && went_on < silence && later > silence / 2;
+  if (!is_arrival_unclear_ || arrived - *heard_again_ < other_evidence) return;
+  set_ahead_ += later;
+  is_arrival_unclear_ = false;
 }
 
 void SensorClocks::follow_steps(Sensor s, Time stamp, Time arrived) {

@@ -86,7 +86,9 @@ class SensorClocks {
   };
   std::optional<Message> imu_;       // the newest one
   std::optional<Time> newest_;       // arrival of any message
-  bool is_arrival_unclear_ = false;  // nothing has arrived for a while, and no message of the IMU since
+  bool is_arrival_unclear_ = false;  // nothing has arrived for a while: the clock of arrival may have been set ahead meanwhile
+  std::optional<Time> heard_again_;  // the first message of the IMU after that arrived
+  Duration delay_before_{};          // of the last one before
   Duration set_ahead_{};             // by which the clock of arrival has been
 };
 
