@@ -17,6 +17,11 @@ Heading heading_of(const State& x);
 /// A step of the error state that leaves those as they are.
 inline ErrorVector without(const Heading& h, const ErrorVector& d) { return d - h * (h.transpose() * d); }
 
+/// Where the heading is known to no small angle, as after a gap: its error turns the correction of `from`, too. Otherwise a tilt that
+/// is corrected makes an unknown heading an unknown tilt, and steps seem to measure it (Huang, Mourikis, Roumeliotis: Observability-based
+/// rules for designing consistent EKF SLAM estimators, 2010).
+void keep_heading_apart(const State& from, Estimate& e);
+
 /// Makes a posterior by the gain (P H' L^-T in W) that of an update that leaves them as they are, but knows how all else goes with them
 /// (Schmidt's consider states: (I - K H) P (I - K H)' + K R K' with these rows of K zero).
 template <int Max>
@@ -37,6 +42,7 @@ void consider(const State& prior, const Gain<Max>& gain, Estimate& posterior) {
   posterior.P.block<3, 3>(at::R, at::bg) += both * along;
   posterior.P.block<3, 3>(at::bg, at::R) += both * along;
   posterior.P.block<3, 3>(at::bg, at::bg) += bias * along;
+  keep_heading_apart(prior, posterior);
 }
 
 /// Two feet in stance measure the body's rotation: the rest of the gyro's rate is bias.
