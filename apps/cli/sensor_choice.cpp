@@ -122,21 +122,24 @@ lab::Failure parse_delay(const std::string& text) {
   const auto milliseconds = take_seconds(rest);
   constexpr double most = 60000;
   if (!milliseconds || !rest.empty() || *milliseconds > most) throw wrong;
-  return {.kind = lab::FailureKind::delay, .sensor = parse_sensor(text.substr(0, colon)), .amount = 1e-3 * *milliseconds};
+  return {.kind = lab::FailureKind::delay,
+          .sensor = parse_sensor(text.substr(0, colon)),
+          .amount = 1e-3 * *milliseconds,
+          .as_asked = fmt::format("--delay {}", text)};
 }
 
 lab::Failure parse_drop(const std::string& text) {
   const UsageError wrong(fmt::format("--drop {}: must be SENSOR:T0-T1 in seconds, as in lidar:10-16, or lidar:10- (to the end)", text));
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos) throw wrong;
-  return between_times({.sensor = parse_sensor(text.substr(0, colon))}, text.substr(colon + 1), wrong);
+  return between_times({.sensor = parse_sensor(text.substr(0, colon)), .as_asked = fmt::format("--drop {}", text)}, text.substr(colon + 1), wrong);
 }
 
 lab::Failure parse_degradation(const std::string& text) {
   const UsageError wrong(
       fmt::format("--degrade {}: must be KIND:T0-T1, KIND one of dark, blank, narrow, accel, gyro, as in dark:10-16", text));
   // A thirtieth of the light; a sector of 30 degrees.
-  const std::map<std::string, lab::Failure> kinds{
+  std::map<std::string, lab::Failure> kinds{
       {"dark", {.kind = lab::FailureKind::darkness, .sensor = Sensor::camera, .amount = 1.0 / 30}},
       {"blank", {.kind = lab::FailureKind::textureless, .sensor = Sensor::camera}},
       {"narrow", {.kind = lab::FailureKind::narrow_sector, .sensor = Sensor::lidar, .amount = std::numbers::pi / 6}},
@@ -145,6 +148,7 @@ lab::Failure parse_degradation(const std::string& text) {
   const std::size_t colon = text.find(':');
   const auto kind = kinds.find(text.substr(0, colon));
   if (colon == std::string::npos || kind == kinds.end()) throw wrong;
+  kind->second.as_asked = fmt::format("--degrade {}", text);
   return between_times(kind->second, text.substr(colon + 1), wrong);
 }
 std::string joined(const std::vector<std::string>& inputs) {

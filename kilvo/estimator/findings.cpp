@@ -52,6 +52,7 @@ void Findings::report(const Situation& now, std::optional<Sensor> sensor, Reason
 void Findings::drop(Sensor sensor, Reason reason, const std::string& text) {
   ++of(sensor).dropped[text.empty() ? text_of(reason) : text];
   ++drops_[index_of(sensor)][static_cast<std::size_t>(reason)];
+  if (reason == Reason::wrong_joints) joint_fault_ = text;
 }
 
 void Findings::look(Time t, const Situation& now) {
@@ -77,6 +78,7 @@ Findings Findings::next_epoch() {
   next.statistics_.clock_shift = {};
   next.events_ = std::move(events_);
   next.drops_ = drops_;
+  next.camera_carried_ = camera_carried_;
   // What was before is not judged again.
   for (std::size_t s = 0; s < sensor_count; ++s) next.used_before_.used[s] = next.statistics_.sensors[s].used;
   next.used_before_.dropped = next.drops_;
@@ -140,9 +142,12 @@ void Findings::report_use(const Use& before, const Situation& now) {
       const std::uint64_t dropped = drops_[s][r] - before.dropped[s][r];
       if (is_usual(reason) || dropped < few || 10 * dropped < used - before.used[s]) continue;
       const double ahead = reason == Reason::clock_ahead ? statistics_.health[s].clock_offset : 0;
-      events_.state({now.t, static_cast<Sensor>(s), reason, ahead, drops_[s][r], {}});
+      const std::string& detail = reason == Reason::wrong_joints ? joint_fault_ : std::string();
+      events_.state({now.t, static_cast<Sensor>(s), reason, ahead, drops_[s][r], detail});
     }
   }
+  const std::uint64_t images = statistics_.sensors[index_of(Sensor::camera)].used;
+  if (!camera_carried_ && images > few) events_.state({now.t, Sensor::camera, Reason::nothing_seen, static_cast<double>(images), 1, {}});
   const auto lidar = index_of(Sensor::lidar), nowhere = static_cast<std::size_t>(Reason::fits_nowhere);
   const std::uint64_t refused = drops_[lidar][nowhere] - before.dropped[lidar][nowhere];
   if (!statistics_.diverged && refused > few && refused > statistics_.sensors[lidar].used - before.used[lidar]) {

@@ -31,6 +31,8 @@ class Findings {
   };
 
   void use(Sensor s) { ++of(s).used; }
+  /// An image was good enough to carry the estimate.
+  void camera_carries() { camera_carried_ = true; }
   /// A message that is not used. `text`: more exact than the reason's.
   void drop(Sensor s, Reason reason, const std::string& text = {});
   /// It became true (again).
@@ -84,6 +86,8 @@ class Findings {
   Statistics statistics_;
   EventLog events_;
   std::array<std::array<std::uint64_t, reason_count>, sensor_count> drops_{};  // by Sensor and Reason
+  std::string joint_fault_;                                                    // of the last message whose joints were wrong
+  bool camera_carried_ = false;                                                // an image has, since the start
   Use used_before_;
   Time streams_looked_at_{}, use_looked_at_{};
   struct Biases {

@@ -144,6 +144,24 @@ TEST_F(Judged, ADirectionThatNothingMeasuresIsReportedWithItsLongestStretch) {
   EXPECT_THAT(warnings()[0], HasSubstr("(2 times)"));
 }
 
+TEST_F(Judged, JointsThatCannotBeUsedAreReportedWithTheirFault) {
+  walk(30, [this] {
+    for (int i = 0; i < 400; ++i) findings_.drop(Sensor::legs, Reason::wrong_joints, "not finite");
+  });
+  EXPECT_THAT(warnings(), ElementsAre(AllOf(HasSubstr("legs"), HasSubstr("messages could not be used: not finite"))));
+}
+
+TEST_F(Judged, ACameraWhoseImagesNeverShowEnoughIsReported) {
+  walk(30, [this] { use(Sensor::camera, 10); });
+  EXPECT_THAT(warnings(), ElementsAre(AllOf(HasSubstr("camera: of "), HasSubstr("too dark"))));
+}
+
+TEST_F(Judged, ACameraThatHasCarriedTheEstimateMaySeeNothingLater) {
+  findings_.camera_carries();
+  walk(30, [this] { use(Sensor::camera, 10); });
+  EXPECT_THAT(warnings(), IsEmpty());
+}
+
 TEST_F(Judged, AnEpochThatBeginsIsInnocent) {
   const auto speed = [this] { estimate_.x.v = {8.3, 0, 0}; };
   walk(3, speed);

@@ -159,7 +159,10 @@ void Estimator::process(const CameraImage& image, const FrameQueue::Frame&, std:
   result.coloured = vision_->learn(map_.surfaces(), map_.error().total(seen.T_WI, seen.posterior.P.topLeftCorner<6, 6>()));
   if (const auto offset = vision_->clock_offset())
     findings_.report_clock_offset(situation(), Sensor::camera, input_.shift_by(Sensor::camera, *offset), input_.robot().camera.time_offset);
-  if (seen.carries) status_.use(Sensor::camera, image.t);
+  if (seen.carries) {
+    status_.use(Sensor::camera, image.t);
+    findings_.camera_carries();
+  }
   result.indicators = indicators_of(seen.used, seen.carries);
   result.stages.visual_us = watch.lap_us();
   outputs_.add_image(std::move(result));

@@ -75,6 +75,7 @@ enum class Reason : std::uint8_t {
   state_thrown_away,
   not_where_predicted,
   foreign_images,
+  nothing_seen,
   camera_turned,
   mount_corrected,
   inconsistent,
@@ -177,6 +178,8 @@ inline constexpr std::array reasons = {
               "a sweep fits the map [] from where the IMU predicted it: samples of the IMU are wrong, or the robot was moved while nothing "
               "measured it. The pose jumps there"},
     ReasonRow{Reason::foreign_images, Severity::warning, "foreign_images", "images of []"},
+    ReasonRow{Reason::nothing_seen, Severity::warning, "nothing_seen",
+              "of {} images none showed enough to be used: too dark, blank, blurred or covered; 16 bits must be used to the top", 1, 0},
     ReasonRow{Reason::camera_turned, Severity::warning, "camera_turned",
               "the images fit a camera that is rotated by {} degrees or more ([] about the axes of the IMU) against camera.T_imu_camera.R: "
               "check the calibration and camera.time_offset. Images are not used for some time",

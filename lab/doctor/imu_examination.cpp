@@ -11,6 +11,7 @@ namespace {
 
 constexpr double per_degree = 57.29577951308232;
 constexpr double rate_tolerance = 0.2;  // of the nominal rate
+constexpr std::size_t fewest_stamps = 9;
 
 double median_norm(const std::vector<InertialSample>& imu) {
   std::vector<double> norms;
@@ -45,7 +46,7 @@ void Examination::examine_rates() {
   for (std::size_t i = 0; i < sensor_count; ++i) {
     const StampStatistics& s = recorded_.stamps[i];
     const auto sensor = static_cast<Sensor>(i);
-    if (s.count < 20 || !(s.period > 0) || !(nominal[i] > 0)) continue;
+    if (s.count < fewest_stamps || !(s.period > 0) || !(nominal[i] > 0)) continue;
     const double rate = 1 / s.period;
     const std::string measured = fmt::format("{:.1f} Hz, described as {:.1f} Hz", rate, nominal[i]);
     if (std::abs(rate / nominal[i] - 1) < rate_tolerance) {

@@ -230,8 +230,8 @@ void Examination::settle_joint_speeds() {
 void Examination::examine_leg_size() {
   if (std::ranges::any_of(diagnosis_.findings, [](const Finding& f) { return f.cause == "leg_lengths"; })) return;
   const LegAcceleration& fit = leg_acceleration_;
-  // On nine sound walks (levels 1 and 2) they seemed too long by 4 % at the most.
-  constexpr double worth_it = 0.5, tolerance = 0.08;  // of the acceleration, -
+  // On twelve sound walks, from five times on each, they seemed too long by 12 % at the most (square_walk 36, level 2, from 22 s on).
+  constexpr double worth_it = 0.5, tolerance = 0.15;  // of the acceleration, -
   if (!fit.good || fit.explained < worth_it) {
     check(Sensor::legs, "lengths of the legs", Check::Verdict::unknown,
           fmt::format("no LiDAR whose way is known, and {:.0f} % of the legs' acceleration is the accelerometer's", 100 * fit.explained));

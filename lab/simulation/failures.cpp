@@ -94,7 +94,7 @@ bool keeps_the_last(const Failure& failure) { return failure.kind == FailureKind
 
 FailingSource::FailingSource(MeasurementSource& source, std::vector<Failure> failures, Time begin, std::function<Time()> arrival,
                              std::uint64_t seed)
-    : source_(source), failures_(std::move(failures)), begin_(begin), arrival_(std::move(arrival)), random_(seed) {}
+    : source_(source), failures_(std::move(failures)), met_(failures_.size()), begin_(begin), arrival_(std::move(arrival)), random_(seed) {}
 
 bool FailingSource::is_on(const Failure& failure, Sensor sensor, Time arrived) const {
   return failure.sensor == sensor && arrived >= after(begin_, failure.from) && arrived < after(begin_, failure.until);
@@ -129,12 +129,22 @@ void FailingSource::spoil(const Failure& failure, Measurement& measurement) {
   }
 }
 
+std::vector<const Failure*> FailingSource::without_effect() const {
+  std::vector<const Failure*> out;
+  for (std::size_t i = 0; i < failures_.size(); ++i) {
+    if (!met_[i]) out.push_back(&failures_[i]);
+  }
+  return out;
+}
+
 void FailingSource::take(Measurement measurement, Time arrived) {
   const Sensor sensor = sensor_of(measurement);
   double delay = 0;
   bool twice = false, frozen = false;
-  for (const Failure& failure : failures_) {
+  for (std::size_t i = 0; i < failures_.size(); ++i) {
+    const Failure& failure = failures_[i];
     if (!is_on(failure, sensor, arrived)) continue;
+    met_[i] = true;
     if (failure.kind == FailureKind::drop || (failure.kind == FailureKind::random_loss && random_.uniform() < failure.amount)) {
       ++dropped_[static_cast<std::size_t>(sensor)];
       return;

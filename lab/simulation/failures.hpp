@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -37,6 +38,7 @@ struct Failure {
   double from = 0;
   double until = std::numeric_limits<double>::infinity();
   double amount = 0;
+  std::string as_asked = {};  // by the user, for messages
 };
 
 class FailingSource final : public MeasurementSource {
@@ -51,6 +53,9 @@ class FailingSource final : public MeasurementSource {
   /// When the measurement that next() gave last arrived.
   Time arrived() const { return arrived_; }
 
+  /// Those of the failures that no message has met.
+  std::vector<const Failure*> without_effect() const;
+
   /// Messages lost.
   std::uint64_t dropped(Sensor sensor) const { return dropped_[static_cast<std::size_t>(sensor)]; }
 
@@ -61,6 +66,7 @@ class FailingSource final : public MeasurementSource {
 
   MeasurementSource& source_;
   std::vector<Failure> failures_;
+  std::vector<bool> met_;  // a message, by index in failures_
   Time begin_;
   std::function<Time()> arrival_;
   Random random_;

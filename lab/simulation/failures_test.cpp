@@ -76,6 +76,15 @@ TEST(Failures, DroppedMessagesAreGoneAndCountedTheOthersStay) {
   EXPECT_EQ(failing.dropped(Sensor::lidar), 0U);
 }
 
+TEST(Failures, ThatNoMessageMeetsAreKnown) {
+  TinySource source;
+  FailingSource failing(source, {{FailureKind::drop, Sensor::imu, 0.1, 0.2}, {FailureKind::drop, Sensor::camera, 50, 60}}, begin);
+  while (failing.next()) {
+  }
+  ASSERT_EQ(failing.without_effect().size(), 1u);
+  EXPECT_EQ(failing.without_effect()[0]->sensor, Sensor::camera);
+}
+
 TEST(Failures, TheTimesAreThoseOfArrival) {
   TinySource source;
   int given = 0;

@@ -127,9 +127,17 @@ TEST_F(Run, AnEndThatNothingMeasuresIsAFailureAndALossBeforeIsAWarning) {
   EXPECT_THAT(bridged.err, HasSubstr("neither LiDAR nor legs measured the motion"));
   const Finished ended = run({"--drop", "lidar:7.5-"});
   EXPECT_EQ(ended.code, 1);
-  EXPECT_THAT(ended.err, HasSubstr("s neither LiDAR nor legs measured the motion: the positions of that time are integrated from the IMU alone "
-                                   "(--duration leaves them out)"));
+  EXPECT_THAT(ended.err,
+              HasSubstr("s neither LiDAR nor legs measured the motion: the positions of that time are integrated from the IMU alone "
+                        "(--duration leaves them out)"));
   EXPECT_EQ(run({"--drop", "lidar:7.5-", "--duration", "7.5"}).code, 0);
+}
+
+TEST_F(Run, ALossThatIsAskedForAndMeetsNothingIsReported) {
+  const Finished f = run({"--drop", "lidar:100-200", "--drop", "camera:1-2", "--drop", "lidar:2-2.3", "--duration", "3"});
+  EXPECT_THAT(f.err, testing::AllOf(HasSubstr("--drop lidar:100-200: without effect, no message of the lidar came in that time"),
+                                    HasSubstr("--drop camera:1-2: without effect, the camera is not used"),
+                                    testing::Not(HasSubstr("lidar:2-2.3: without"))));
 }
 
 TEST_F(Run, DroppedScansAreCountedAndBridged) {
