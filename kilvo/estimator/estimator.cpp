@@ -165,6 +165,7 @@ void Estimator::process(ImuSample s, std::vector<Output>& out) {
     history_.resume(history_.now());
   }
   history_.close(s.t);
+  if (was_blind) findings_.report_gap(situation(), to_seconds(s.t - heard));
   if (!status_.has_legs()) history_.take_closing_us();
   if (keep_plausible()) history_.remember_good();
   if (s.t - history_.base().t > longest_wait && frames_.empty()) history_.rebase_to_closed();

@@ -100,6 +100,17 @@ void Findings::report_clipping(const Situation& now, const ImuSample& s, std::ui
   events_.state({now.t, Sensor::imu, s.gyro_clipped ? Reason::gyro_clipped : Reason::accel_clipped, value, count, {}});
 }
 
+void Findings::report_gap(const Situation& now, double gap) {
+  constexpr double worth_it = 0.1, all_around = 180;  // m, degrees
+  const Covariance& P = now.estimate.P;
+  const Eigen::Vector3d up_I = now.estimate.x.R.inverse() * -now.estimate.x.g.normalized();
+  const double position = std::sqrt(P.block<3, 3>(at::p, at::p).trace()),
+               heading = 57.295779513 * std::sqrt(up_I.dot(P.block<3, 3>(at::R, at::R) * up_I));
+  if (position < worth_it) return;
+  report(now, Sensor::imu, Reason::gap_of_imu, gap,
+         decimals(position, 1) + " m and " + decimals(std::min(heading, all_around), 0) + " degrees");
+}
+
 void Findings::report_clock_steps(const Situation& now, const ClockSteps& steps) {
   statistics_.clock_steps = steps.count();
   const double back = to_seconds(steps.last());

@@ -39,6 +39,8 @@ class Findings {
   void report(const Situation& now, std::optional<Sensor> sensor, Reason reason, double value = 0, std::string detail = {});
   /// A sample at the end of the IMU's range; `count` of them until now.
   void report_clipping(const Situation& now, const ImuSample& s, std::uint64_t count);
+  /// The IMU is back after so long, s.
+  void report_gap(const Situation& now, double gap);
   /// The IMU's clock has stepped again, and its stamps are put right since.
   void report_clock_steps(const Situation& now, const ClockSteps& steps);
   /// A sensor's clock was found to be off the IMU's: `total` s is added to its stamps from now on, beside the `configured` ones.

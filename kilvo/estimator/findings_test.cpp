@@ -162,6 +162,22 @@ TEST_F(Judged, ACameraThatHasCarriedTheEstimateMaySeeNothingLater) {
   EXPECT_THAT(warnings(), IsEmpty());
 }
 
+TEST_F(Judged, AGapOfTheImuIsReportedWithWhatItLeavesUncertain) {
+  estimate_.P.diagonal().segment<3>(at::p).setConstant(0.0025);
+  findings_.report_gap(situation(), 0.3);
+  EXPECT_THAT(warnings(), IsEmpty()) << "0.09 m";
+  estimate_.P.diagonal().segment<3>(at::p) << 4, 4, 1;
+  estimate_.P(at::R + 2, at::R + 2) = 0.25;
+  findings_.report_gap(situation(), 2.5);
+  estimate_.P(at::R + 2, at::R + 2) = 16;
+  findings_.report_gap(situation(), 9);
+  const auto events = findings_.take_events();
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(text_of(events[0]), "imu: after 2.5 s without it position and heading are uncertain by 3.0 m and 29 degrees, one sigma, until "
+                                "the robot is found in its map");
+  EXPECT_THAT(text_of(events[1]), HasSubstr("by 3.0 m and 180 degrees"));
+}
+
 TEST_F(Judged, AnEpochThatBeginsIsInnocent) {
   const auto speed = [this] { estimate_.x.v = {8.3, 0, 0}; };
   walk(3, speed);
