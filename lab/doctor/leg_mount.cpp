@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "lab/doctor/examination.hpp"
+#include "lab/doctor/sole_level.hpp"
 
 namespace kilvo::lab {
 namespace {
@@ -109,6 +110,35 @@ StanceFit Examination::standing_by(Robot& start, const MountFit& by_turning, dou
   return by_turned;
 }
 
+// The turning knows the mount to some degrees, the soles its inclination: both together.
+bool Examination::find_inclined_imu(const MountFit& fit, double method) {
+  const SO3 described = robot_.imu.T_link_imu.R.inverse();
+  const auto soles = sole_level(legs_under(nullptr), mended_imu(), gyro(), robot_.imu.T_link_imu.R, fit.offset,
+                                [this](double t) { return stepping_.bears(t); });
+  if (!soles || !fit.fit.good) return false;
+  const Eigen::Matrix3d to_imu = described.matrix();
+  const Eigen::Vector3d by_turning = (fit.R * described.inverse()).Log(), by_soles = -(to_imu * soles->turn);
+  const Eigen::Matrix3d of_soles = to_imu * soles->information * to_imu.transpose();
+  const double sigma_method = method / degrees(1);
+  const Eigen::Matrix3d of_turning = (fit.rotation_sigma().array().square() + sigma_method * sigma_method).inverse().matrix().asDiagonal();
+  const Eigen::Matrix3d information = of_turning + of_soles;
+  const Eigen::Vector3d turn = information.ldlt().solve(of_turning * by_turning + of_soles * by_soles);
+  const auto off = [](const Eigen::Vector3d& x, const Eigen::Matrix3d& A) { return std::sqrt(x.dot(A * x)); };
+  constexpr double inclined = 4, agree = 3;  // degrees; standard deviations
+  if (degrees(turn.norm()) < inclined || off(turn, information) < sure_among(3)) return false;
+  if (off(by_turning - turn, of_turning) > agree || off(by_soles - turn, of_soles) > agree) return false;
+  settle_imu_link((SO3::Exp(turn) * described).inverse());
+  if (!diagnosis_.findings.empty() && diagnosis_.findings.back().cause == "imu_mount_rotation") {
+    Finding& f = diagnosis_.findings.back();
+    f.turn = turn;
+    f.evidence = fmt::format(
+        "the soles are inclined by {:.1f} degrees on the mean, whichever way the robot goes, and by the turning of the legs against the "
+        "gyro's it is turned by {:.1f}; together {:.1f} standard deviations",
+        degrees(soles->turn.norm()), degrees(by_turning.norm()), off(turn, information));
+  }
+  return true;
+}
+
 void Examination::examine_leg_rotation() {
   const SO3 described = robot_.imu.T_link_imu.R.inverse();
   MountFit fit = measure_leg_mount();
@@ -163,7 +193,9 @@ void Examination::examine_leg_rotation() {
   const std::string detail = fmt::format("{:.1f} degrees from the description, standard deviation {:.1f}; {:.0f} % explained", angle,
                                          uncertain, 100 * fit.explained);
   constexpr double alone_tolerance = 12;  // degrees: legs and gyro alone
-  if (angle > std::max(stances.good || accelerates ? leg_rotation_tolerance : alone_tolerance, sure * uncertain)) {
+  if (!stances.good && !accelerates && way.empty() && find_inclined_imu(fit, method)) {
+    // found
+  } else if (angle > std::max(stances.good || accelerates ? leg_rotation_tolerance : alone_tolerance, sure * uncertain)) {
     settle_imu_link(fit.R.inverse());
     if (!diagnosis_.findings.empty() && diagnosis_.findings.back().cause == "imu_mount_rotation") {
       diagnosis_.findings.back().turn = turn;
