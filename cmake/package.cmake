@@ -15,8 +15,8 @@ install(EXPORT kilvoTargets NAMESPACE kilvo:: DESTINATION ${CMAKE_INSTALL_LIBDIR
 # Beside the estimator: the live runner, configuration files, message decoding and what a node does. Components of the package, for they
 # need more.
 if(TARGET kilvo_node_core)
-  set(more kilvo_lab_clocks kilvo_lab_messages kilvo_lab_mapping kilvo_lab_settings kilvo_lab_doctor kilvo_live kilvo_node_core)
-  set(names clocks messages mapping settings doctor live node)
+  set(more kilvo_lab_clocks kilvo_lab_contacts kilvo_lab_messages kilvo_lab_mapping kilvo_lab_settings kilvo_lab_doctor kilvo_live kilvo_node_core)
+  set(names clocks contacts messages mapping settings doctor live node)
   foreach(target name IN ZIP_LISTS more names)
     set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
     target_include_directories(${target} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/kilvo-live>)

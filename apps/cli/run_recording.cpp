@@ -79,7 +79,7 @@ class Run {
     files_.write_events(estimator_.take_events());
     if (!interrupted) settle_description();
     if (facts_.failure.empty()) facts_.failure = failure(interrupted);
-    if (!interrupted) tell_without_effect();
+    if (!interrupted) warn_of_no_effect(failing_, facts_.sensors, facts_.warnings);
     files_.close();
     if (log_) log_->close();
     skeleton_.close();
@@ -184,12 +184,11 @@ class Run {
 
   // The first messages of the legs show whether they are of the robot in the configuration. Hands and heads may speak on the same topic.
   void require_legs(const Measurement& m) {
-    constexpr int patience = 20;  // messages
     const auto* joints = std::get_if<JointSample>(&m);
     if (joints == nullptr || joints->position.empty() || legs_seen_) return;
     const auto why = estimator_.mismatch(*joints);
     legs_seen_ = !why;
-    if (why && ++foreign_legs_ == patience)
+    if (why && ++foreign_legs_ == 20)  // messages
       throw lab::ConfigError(fmt::format("{}: {} (topic {})", facts_.config_file, *why, source_.topic(Sensor::legs)));
   }
 
@@ -223,15 +222,6 @@ class Run {
     if (!estimator_.initialised()) return estimator_.waiting_for();
     return fmt::format("{} sweeps, {:.1f} m", files_.run_summary().sweeps(), files_.run_summary().path_length());
   }
-  void tell_without_effect() {
-    for (const lab::Failure* asked : failing_.without_effect()) {
-      const bool is_used = std::ranges::find(facts_.sensors, asked->sensor) != facts_.sensors.end();
-      facts_.warnings.push_back(fmt::format("{}: without effect, {}", asked->as_asked,
-                                            is_used ? fmt::format("no message of the {} came in that time", name_of(asked->sensor))
-                                                    : fmt::format("the {} is not used", name_of(asked->sensor))));
-    }
-  }
-
   std::string failure(bool interrupted) const {
     return interrupted ? "stopped by the user" : failure_of(files_.run_summary(), estimator_, source_);
   }

@@ -132,7 +132,8 @@ lab::Failure parse_drop(const std::string& text) {
   const UsageError wrong(fmt::format("--drop {}: must be SENSOR:T0-T1 in seconds, as in lidar:10-16, or lidar:10- (to the end)", text));
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos) throw wrong;
-  return between_times({.sensor = parse_sensor(text.substr(0, colon)), .as_asked = fmt::format("--drop {}", text)}, text.substr(colon + 1), wrong);
+  return between_times({.sensor = parse_sensor(text.substr(0, colon)), .as_asked = fmt::format("--drop {}", text)}, text.substr(colon + 1),
+                       wrong);
 }
 
 lab::Failure parse_degradation(const std::string& text) {
@@ -151,6 +152,16 @@ lab::Failure parse_degradation(const std::string& text) {
   kind->second.as_asked = fmt::format("--degrade {}", text);
   return between_times(kind->second, text.substr(colon + 1), wrong);
 }
+void warn_of_no_effect(const lab::FailingSource& failing, const std::vector<Sensor>& used, std::vector<std::string>& out) {
+  for (const lab::Failure* asked : failing.without_effect()) {
+    const bool is_used = std::ranges::find(used, asked->sensor) != used.end();
+    const char* name = name_of(asked->sensor);
+    out.push_back(
+        fmt::format("{}: without effect, {}", asked->as_asked,
+                    is_used ? fmt::format("no message of the {} came in that time", name) : fmt::format("the {} is not used", name)));
+  }
+}
+
 std::string joined(const std::vector<std::string>& inputs) {
   std::string all;
   for (const std::string& input : inputs) all += (all.empty() ? "" : " + ") + input;

@@ -25,6 +25,9 @@ lab::Failure parse_degradation(const std::string& text);
 /// "camera:50": its messages come 50 ms later. Throws UsageError.
 lab::Failure parse_delay(const std::string& text);
 
+/// Adds a sentence about each of the failures that met no message.
+void warn_of_no_effect(const lab::FailingSource& failing, const std::vector<Sensor>& used, std::vector<std::string>& out);
+
 struct SensorChoice {
   std::vector<Sensor> used;
   std::vector<std::string> warnings;  // what is configured and not there

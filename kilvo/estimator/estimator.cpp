@@ -25,7 +25,7 @@ Estimator::Estimator(const Robot& robot, const EstimatorConfig& config, std::arr
   if (!input_.uses(Sensor::imu)) throw std::invalid_argument("the IMU is needed: nothing is estimated without it");
   if (config.lidar.voxel_size > map_.surfaces().leaf_size() * (1 + 1e-9))
     throw std::invalid_argument("lidar.voxel_size must be at most a quarter of map.voxel_size");
-  if (input_.uses(Sensor::legs)) kinematics_ = std::make_unique<LegKinematics>(robot, config.legs.contact == "force");
+  if (input_.uses(Sensor::legs)) kinematics_ = std::make_unique<LegKinematics>(robot, legs_.needs_forces());
   if (input_.uses(Sensor::camera)) vision_.emplace(robot.camera, config.vision, config.visual_map, config.update, config.map.radius);
 }
 

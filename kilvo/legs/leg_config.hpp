@@ -1,12 +1,15 @@
 // Settings of the legs. No length, weight or speed of a particular robot is in them: speeds are compared with the robot's own steps.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <tuple>
 
 #include "kilvo/math/field.hpp"
 
 namespace kilvo {
+
+class ContactDetector;
 
 struct LegConfig {
   std::string contact = "kilvo";           // kilvo | paper | variance | force
@@ -23,6 +26,8 @@ struct LegConfig {
   std::string adaptation = "foot";  // foot | row | none
   std::string height = "ki";        // ki | always | never
   std::string ground = "map";       // map | contacts
+  // Makes the method that `contact` names; ours needs none.
+  std::unique_ptr<ContactDetector> (*detector)() = nullptr;
 
   static constexpr auto fields() {
     return std::tuple{

@@ -3,47 +3,39 @@
 #pragma once
 
 #include <array>
-#include <variant>
+#include <memory>
 
 #include "kilvo/filter/state.hpp"
-#include "kilvo/legs/contact_estimator.hpp"
+#include "kilvo/legs/contact_detector.hpp"
 #include "kilvo/legs/leg_motion_error.hpp"
 #include "kilvo/legs/level_ground.hpp"
-#include "kilvo/legs/paper_contacts.hpp"
-#include "kilvo/legs/simple_contacts.hpp"
 #include "kilvo/legs/stance_tracker.hpp"
 
 namespace kilvo {
 
-/// The contact estimation that legs.contact names.
-class ContactDetector {
+/// A method of contact estimation that is copied with its owner.
+class OwnedDetector {
  public:
-  /// Throws std::invalid_argument when config.contact names none.
-  explicit ContactDetector(const LegConfig& config);
-
-  /// See ContactEstimator::update. `sigma_v`: uncertainty of the velocity of x, m/s.
-  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel, double sigma_v = 0,
-                         const VoxelMap* map = nullptr);
-  const Contacts& contacts() const;
-
-  /// After a gap in the legs' messages, or when no foot could be used for long.
-  void restart();
-
-  /// The detector's own view of the noise of a leg sample's rows (Eq. 8), where it has one. `x`: before the update; `gyro`: as measured,
-  /// rad/s. `ground`: whether the height of the feet counts.
-  void adapt(LegStep& step, const State& x, const Eigen::Vector3d& gyro, StanceTracker::Ground ground);
+  /// Throws std::invalid_argument when config.contact names another method than ours and config.detector makes none.
+  explicit OwnedDetector(const LegConfig& config);
+  OwnedDetector(const OwnedDetector& other) : method_(other.method_->clone()) {}
+  OwnedDetector& operator=(const OwnedDetector& other) { return method_->assign(*other.method_), *this; }
+  OwnedDetector(OwnedDetector&&) noexcept = default;
+  ~OwnedDetector() = default;
+  ContactDetector* operator->() { return method_.get(); }
+  const ContactDetector* operator->() const { return method_.get(); }
 
  private:
-  std::variant<ContactEstimator, PaperContactEstimator, VarianceContacts, ForceContacts> detector_;
-  double ground_sigma_;  // m
+  std::unique_ptr<ContactDetector> method_;
 };
 
 class LegPipeline {
  public:
-  /// Throws std::invalid_argument when config.contact names no detector.
+  /// Throws std::invalid_argument as OwnedDetector does.
   explicit LegPipeline(const LegConfig& config)
       : contacts_(config),
         stances_(config),
+        ground_sigma_(config.ground_sigma),
         always_height_(config.height == "always"),
         has_level_ground_(config.height != "never" && config.ground != "contacts") {}
 
@@ -70,7 +62,8 @@ class LegPipeline {
   /// When a foot was used last.
   Time last_used_stance() const { return last_used_stance_; }
 
-  const Contacts& contacts() const { return contacts_.contacts(); }
+  const Contacts& contacts() const { return contacts_->contacts(); }
+  bool needs_forces() const { return contacts_->needs_forces(); }
   /// Something else has measured the pose, see LegMotionError.
   void pose_is_measured(const Eigen::Matrix3d& unknown);
   /// By how much the pose of `x` may be off because the robot is not quite as described, or a stair was none.
@@ -85,9 +78,10 @@ class LegPipeline {
  private:
   void find_level_ground(LegStep& step, const Estimate& predicted, StanceTracker::Ground ground);
 
-  ContactDetector contacts_;
+  OwnedDetector contacts_;
   StanceTracker stances_;
   LevelGround level_ground_;
+  double ground_sigma_;  // m
   bool always_height_, has_level_ground_;
   Time last_used_stance_{};  // when a foot was used last
   Time last_stance_{};       // the same, or since when that is waited for

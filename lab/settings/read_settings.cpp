@@ -5,6 +5,7 @@
 #include <set>
 #include <sstream>
 
+#include "lab/contacts/contact_methods.hpp"
 #include "lab/settings/check_settings.hpp"
 #include "lab/settings/nearest.hpp"
 #include "lab/settings/pose_forms.hpp"
@@ -208,6 +209,7 @@ Settings parse_settings(const std::string& yaml, const std::string& name, const 
   problems.collect([&] { read_urdf(settings, folder); });
   problems.collect([&] { check_settings(settings); });
   problems.report();
+  settings.estimator.legs.detector = contact_method(settings.estimator.legs.contact);
   return settings;
 }
 

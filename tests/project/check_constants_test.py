@@ -4,7 +4,7 @@ import unittest
 
 from planted_tree import PlantedTree
 
-LIMIT = 461
+LIMIT = 443
 
 
 class CheckConstants(PlantedTree):

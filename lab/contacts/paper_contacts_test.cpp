@@ -1,12 +1,13 @@
 // The rules of the paper's Section V, one by one. Equations are the paper's.
-#include "kilvo/legs/paper_contacts.hpp"
+#include "lab/contacts/paper_contacts.hpp"
 
 #include <gtest/gtest.h>
 
 #include "kilvo/legs/leg_pipeline.hpp"
+#include "lab/contacts/contact_methods.hpp"
 #include "tests/helpers/contact_watch.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 namespace paper_contacts_test {
 
 using std::chrono::milliseconds;
@@ -198,32 +199,65 @@ TEST(PaperContacts, EachRowIsLoosenedByItsOwnDeviation) {  // Eq. 8
   EXPECT_DOUBLE_EQ(walker.contacts.row_scale(far)[2], largest_scale);
 }
 
-TEST(ContactDetector, IsTheOneThatTheSettingNames) {
+TEST(ContactMethods, AreMadeByTheNameOfTheSetting) {
   LegConfig config;
-  EXPECT_NO_THROW(ContactDetector{config});
-  config.contact = "papper";
-  try {
-    ContactDetector detector(config);
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("legs.contact"), std::string::npos);
+  EXPECT_NO_THROW(OwnedDetector{config});
+  EXPECT_EQ(contact_method("kilvo"), nullptr);
+  EXPECT_NE(dynamic_cast<PaperContactEstimator*>(contact_method("paper")().get()), nullptr);
+  EXPECT_TRUE(contact_method("force")()->needs_forces());
+  EXPECT_FALSE(contact_method("variance")()->needs_forces());
+  const auto error_of = [](auto&& what) -> std::string {
+    try {
+      what();
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return {};
+  };
+  EXPECT_NE(error_of([] { contact_method("papper"); }).find("legs.contact"), std::string::npos);
+  config.contact = "paper";
+  EXPECT_NE(error_of([&] { OwnedDetector detector(config); }).find("legs.contact"), std::string::npos) << "without what makes it";
+}
+
+TEST(ContactMethods, ACopyIsIndependentAndAnAssignedOneIsTheSame) {
+  const test::Gait gait;
+  const auto follow = [&gait](ContactDetector& detector, int from, int until) {
+    for (int i = from; i < until; ++i)
+      detector.update(gait.feet(1e-3 * i), gait.body(1e-3 * i), Eigen::Vector3d::Zero(), {0, 0, standard_gravity});
+    return detector.contacts().t;
+  };
+  for (const char* name : {"kilvo", "paper", "variance", "force"}) {
+    LegConfig config;
+    config.contact = name;
+    config.detector = contact_method(name);
+    LegPipeline pipeline(config);
+    OwnedDetector first(config);
+    follow(*first.operator->(), 0, 100);
+    OwnedDetector copy = first;
+    const Time then = copy->contacts().t;
+    EXPECT_EQ(then, first->contacts().t) << name;
+    EXPECT_GT(follow(*first.operator->(), 100, 200), then);
+    EXPECT_EQ(copy->contacts().t, then);
+    copy = first;
+    EXPECT_EQ(copy->contacts().t, first->contacts().t);
   }
 }
 
 // With the paper's detector each row of a standing foot has its own factor, with ours none.
-TEST(ContactDetector, OnlyThePapersAdaptsRowByRow) {
+TEST(ContactMethods, OnlyThePapersAdaptsRowByRow) {
   for (const char* name : {"kilvo", "paper"}) {
     LegConfig config;
     config.contact = name;
-    ContactDetector detector(config);
+    config.detector = contact_method(name);
+    OwnedDetector detector(config);
     StanceTracker tracker(config);
     const test::Gait gait;
     LegStep step;
     for (int i = 0; i < 100; ++i) {
       const State x = gait.body(1e-3 * i);
-      const Contacts& now = detector.update(gait.feet(1e-3 * i), x, Eigen::Vector3d::Zero(), {0, 0, standard_gravity});
+      const Contacts& now = detector->update(gait.feet(1e-3 * i), x, Eigen::Vector3d::Zero(), {0, 0, standard_gravity});
       step = tracker.step(gait.feet(1e-3 * i), now, x, Eigen::Vector3d::Zero());
-      detector.adapt(step, x, Eigen::Vector3d::Zero(), StanceTracker::Ground::use);
+      detector->adapt(step, x, Eigen::Vector3d::Zero(), {true, config.ground_sigma});
     }
     ASSERT_TRUE(step.foot[0].used);
     EXPECT_EQ(step.foot[0].row_scale.has_value(), std::string(name) == "paper");
@@ -231,4 +265,4 @@ TEST(ContactDetector, OnlyThePapersAdaptsRowByRow) {
 }
 
 }  // namespace paper_contacts_test
-}  // namespace kilvo
+}  // namespace kilvo::lab

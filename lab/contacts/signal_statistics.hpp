@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 
-namespace kilvo {
+namespace kilvo::lab {
 
 template <int N>
 class SignalStatistics {
@@ -31,4 +31,4 @@ class SignalStatistics {
   Vector mean_ = Vector::Zero(), squares_ = Vector::Zero();
 };
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

@@ -1,8 +1,8 @@
-#include "kilvo/legs/simple_contacts.hpp"
+#include "lab/contacts/simple_contacts.hpp"
 
 #include <algorithm>
 
-namespace kilvo {
+namespace kilvo::lab {
 namespace {
 
 using std::chrono::milliseconds;
@@ -43,7 +43,8 @@ void ContactReport::set(std::size_t side, bool on) {
   contacts_.since[side] = contacts_.t;
 }
 
-const Contacts& ForceContacts::update(const Feet& feet, const State& x) {
+const Contacts& ForceContacts::update(const Feet& feet, const State& x, const Eigen::Vector3d& /*omega*/, const Eigen::Vector3d& /*accel*/,
+                                      double /*sigma_v*/, const VoxelMap* /*map*/) {
   begin(feet, x);
   if (!feet.force_I) return contacts_;
   const Eigen::Vector3d up_I = x.R.matrix().transpose() * -x.g.normalized();
@@ -58,7 +59,8 @@ const Contacts& ForceContacts::update(const Feet& feet, const State& x) {
   return contacts_;
 }
 
-const Contacts& VarianceContacts::update(const Feet& feet, const State& x, const Eigen::Vector3d& accel) {
+const Contacts& VarianceContacts::update(const Feet& feet, const State& x, const Eigen::Vector3d& /*omega*/, const Eigen::Vector3d& accel,
+                                         double /*sigma_v*/, const VoxelMap* /*map*/) {
   const Time before = contacts_.t;
   if (begin(feet, x)) {
     count_ = 0;
@@ -94,4 +96,4 @@ const Contacts& VarianceContacts::update(const Feet& feet, const State& x, const
   return contacts_;
 }
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

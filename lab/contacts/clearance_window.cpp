@@ -1,8 +1,8 @@
-#include "kilvo/legs/clearance_window.hpp"
+#include "lab/contacts/clearance_window.hpp"
 
 #include <algorithm>
 
-namespace kilvo {
+namespace kilvo::lab {
 namespace {
 
 // Stamps of 1 kHz vary: what is nearly a millisecond apart is kept.
@@ -49,4 +49,4 @@ std::optional<double> ClearanceWindow::trend(Duration slice) const {
   return tc / tt;
 }
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

@@ -1,6 +1,6 @@
-#include "kilvo/legs/paper_contacts.hpp"
+#include "lab/contacts/paper_contacts.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 namespace {
 
 using std::chrono::milliseconds;
@@ -139,7 +139,7 @@ bool PaperContactEstimator::lands(std::size_t side, bool impact, double d_fv, Ti
 }
 
 const Contacts& PaperContactEstimator::update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel,
-                                              const VoxelMap* map) {
+                                              double /*sigma_v*/, const VoxelMap* map) {
   const Eigen::Vector3d up_I = x.R.matrix().transpose() * -x.g.normalized();
   std::array<FootMotionNow, 2> motion;
   for (std::size_t side = 0; side < 2; ++side) {
@@ -178,4 +178,23 @@ const Contacts& PaperContactEstimator::update(const Feet& feet, const State& x, 
   return contacts_;
 }
 
-}  // namespace kilvo
+void PaperContactEstimator::adapt(LegStep& step, const State& x, const Eigen::Vector3d& gyro, const Height& height) {
+  for (std::size_t side = 0; side < 2; ++side) {
+    Stance& foot = step.foot[side];
+    if (!foot.used || !contacts_.on[side]) continue;
+    const Eigen::Vector3d pc = foot.begins ? x.pose() * foot.point.p : Eigen::Vector3d(x.pc[side] + x.R * foot.shift);
+    Residual r;  // r_c of Eq. 7
+    r << foot_velocity(x, foot.point, gyro).r, foot_position(x, foot.point, pc).r, foot_height(contacts_.ground[side], x, pc).r;
+    learn(side, r);
+    foot.row_scale = row_scale(r);
+    foot.variance_scale = 1;
+    const auto& patch = foot_[side].contact_patch;
+    if (!foot.begins || foot.ground || !patch || !height.counts) continue;
+    // Of a patch that the robot's own contacts span: it ties steps to each other, it is no absolute height, m.
+    constexpr double contact_patch_sigma = 0.01;
+    foot.ground = patch;
+    foot.ground->sigma = std::hypot(std::max(patch->sigma, contact_patch_sigma), height.sigma);
+  }
+}
+
+}  // namespace kilvo::lab

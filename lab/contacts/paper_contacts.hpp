@@ -6,11 +6,12 @@
 #include <array>
 #include <optional>
 
-#include "kilvo/legs/clearance_window.hpp"
+#include "kilvo/legs/contact_detector.hpp"
 #include "kilvo/legs/leg_measurements.hpp"
-#include "kilvo/legs/signal_statistics.hpp"
+#include "lab/contacts/clearance_window.hpp"
+#include "lab/contacts/signal_statistics.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 
 /// A cue that counts only once it has lasted.
 class HeldCue {
@@ -24,7 +25,7 @@ class HeldCue {
   int samples_ = 0;
 };
 
-class PaperContactEstimator {
+class PaperContactEstimator final : public CopyableDetector<PaperContactEstimator> {
  public:
   static constexpr int N_d = 5;  // frames
 
@@ -32,12 +33,15 @@ class PaperContactEstimator {
   using Residual = Eigen::Matrix<double, 7, 1>;
 
   /// `x`: the state at feet.t. `omega`, `accel`: bias-free rate (rad/s), specific force (m/s^2) of the IMU. `map`: of the ground, if any.
-  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel,
-                         const VoxelMap* map = nullptr);
-  const Contacts& contacts() const { return contacts_; }
+  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel, double sigma_v = 0,
+                         const VoxelMap* map = nullptr) override;
+  const Contacts& contacts() const override { return contacts_; }
 
   /// Forgets the feet, not the statistics: after a gap in the legs' messages. Both are taken as standing until they move.
-  void restart() { started_ = false; }
+  void restart() override { started_ = false; }
+  /// Eq. 8, row by row. A foot that is used without a detected contact, because no other has one, keeps its large noise. Without a map, and
+  /// where it is not known to be level, the ground is that of the earlier contacts (KI).
+  void adapt(LegStep& step, const State& x, const Eigen::Vector3d& gyro, const Height& height) override;
 
   /// r_c of a foot that carries rows in this sample: while the first swing lasts its statistics are learned from it.
   void learn(std::size_t side, const Residual& r);
@@ -90,4 +94,4 @@ class PaperContactEstimator {
   std::array<FootState, 2> foot_;
 };
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

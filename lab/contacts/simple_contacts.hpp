@@ -4,16 +4,12 @@
 
 #include <array>
 
-#include "kilvo/legs/contact_estimator.hpp"
+#include "kilvo/legs/contact_detector.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 
 /// Time, clearance and phase, which every method reports alike.
 class ContactReport {
- public:
-  const Contacts& contacts() const { return contacts_; }
-  void restart() { started_ = false; }
-
  protected:
   /// Begins a sample; true when it is the first one.
   bool begin(const Feet& feet, const State& x);
@@ -21,16 +17,18 @@ class ContactReport {
 
   Contacts contacts_;
   std::array<Eigen::Vector3d, 2> lowest_;  // of each foot in the world, m
-
- private:
   bool started_ = false;
 };
 
 /// A foot is in contact while the force that the joints' efforts imply exceeds a share of the robot's weight. The weight is that of the
 /// first half second. Without efforts both feet are taken as standing.
-class ForceContacts : public ContactReport {
+class ForceContacts final : public CopyableDetector<ForceContacts>, private ContactReport {
  public:
-  const Contacts& update(const Feet& feet, const State& x);
+  const Contacts& contacts() const override { return contacts_; }
+  void restart() override { started_ = false; }
+  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel, double sigma_v = 0,
+                         const VoxelMap* map = nullptr) override;
+  bool needs_forces() const override { return true; }
 
  private:
   double weight_ = 0;  // N
@@ -40,9 +38,12 @@ class ForceContacts : public ContactReport {
 
 /// As HR2-KILO is described: when the acceleration's variance within a short window rises, a foot has come down; it is the one that was
 /// higher over the ground within the last swing, and the other one leaves. Lift-offs are not seen; until the first impact both stand.
-class VarianceContacts : public ContactReport {
+class VarianceContacts final : public CopyableDetector<VarianceContacts>, private ContactReport {
  public:
-  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& accel);
+  const Contacts& contacts() const override { return contacts_; }
+  void restart() override { started_ = false; }
+  const Contacts& update(const Feet& feet, const State& x, const Eigen::Vector3d& omega, const Eigen::Vector3d& accel, double sigma_v = 0,
+                         const VoxelMap* map = nullptr) override;
 
  private:
   static constexpr std::size_t window = 50;  // samples at most, of one millisecond at least
@@ -53,4 +54,4 @@ class VarianceContacts : public ContactReport {
   std::array<double, 2> highest_{};  // over the other foot since the last event, m
 };
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

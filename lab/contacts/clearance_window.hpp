@@ -7,7 +7,7 @@
 
 #include "kilvo/sensors/time.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 
 class ClearanceWindow {
  public:
@@ -38,4 +38,4 @@ class ClearanceWindow {
   std::size_t count_ = 0;  // of all that came; the last `capacity` are kept
 };
 
-}  // namespace kilvo
+}  // namespace kilvo::lab

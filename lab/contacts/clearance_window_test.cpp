@@ -1,8 +1,8 @@
-#include "kilvo/legs/clearance_window.hpp"
+#include "lab/contacts/clearance_window.hpp"
 
 #include <gtest/gtest.h>
 
-namespace kilvo {
+namespace kilvo::lab {
 namespace clearance_window_test {
 
 using std::chrono::milliseconds;
@@ -56,4 +56,4 @@ TEST(ClearanceWindow, TheOldestGoFirst) {
 }
 
 }  // namespace clearance_window_test
-}  // namespace kilvo
+}  // namespace kilvo::lab

@@ -1,10 +1,10 @@
-#include "kilvo/legs/simple_contacts.hpp"
+#include "lab/contacts/simple_contacts.hpp"
 
 #include <gtest/gtest.h>
 
 #include "tests/helpers/synthetic_gait.hpp"
 
-namespace kilvo {
+namespace kilvo::lab {
 namespace simple_contacts_test {
 
 const test::Gait gait{.first = 1.0};
@@ -17,10 +17,11 @@ Feet carried(double s, double left, double right) {
 
 TEST(ForceContacts, AFifthOfTheWeightIsAContact) {
   ForceContacts contacts;
-  for (int i = 0; i < 600; ++i) contacts.update(carried(1e-3 * i, 150, 150), gait.body(0));
-  contacts.update(carried(0.6, 230, 70), gait.body(0));
+  for (int i = 0; i < 600; ++i)
+    contacts.update(carried(1e-3 * i, 150, 150), gait.body(0), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  contacts.update(carried(0.6, 230, 70), gait.body(0), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   EXPECT_TRUE(contacts.contacts().on[0] && contacts.contacts().on[1]);
-  contacts.update(carried(0.601, 250, 50), gait.body(0));
+  contacts.update(carried(0.601, 250, 50), gait.body(0), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   EXPECT_TRUE(contacts.contacts().on[0]);
   EXPECT_FALSE(contacts.contacts().on[1]);
   EXPECT_DOUBLE_EQ(contacts.contacts().phase(1), 0);
@@ -28,7 +29,8 @@ TEST(ForceContacts, AFifthOfTheWeightIsAContact) {
 
 TEST(ForceContacts, WithoutEffortsBothStand) {
   ForceContacts contacts;
-  for (int i = 0; i < 3000; ++i) contacts.update(gait.feet(1e-3 * i), gait.body(1e-3 * i));
+  for (int i = 0; i < 3000; ++i)
+    contacts.update(gait.feet(1e-3 * i), gait.body(1e-3 * i), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   EXPECT_TRUE(contacts.contacts().on[0] && contacts.contacts().on[1]);
 }
 
@@ -42,7 +44,7 @@ TEST(VarianceContacts, AJoltIsTheTouchdownOfTheFootThatWasHigh) {
   for (int i = 0; i < 6000; ++i) {
     const double s = 1e-3 * i;
     const auto before = contacts.contacts().on;
-    contacts.update(gait.feet(s), gait.body(s), {0, 0, standard_gravity + (jolts_at(s) ? 12.0 : 0.0)});
+    contacts.update(gait.feet(s), gait.body(s), Eigen::Vector3d::Zero(), {0, 0, standard_gravity + (jolts_at(s) ? 12.0 : 0.0)});
     for (std::size_t side = 0; side < 2; ++side) {
       if (s < 2 || before[side] || !contacts.contacts().on[side]) continue;
       ++landed;
@@ -54,4 +56,4 @@ TEST(VarianceContacts, AJoltIsTheTouchdownOfTheFootThatWasHigh) {
 }
 
 }  // namespace simple_contacts_test
-}  // namespace kilvo
+}  // namespace kilvo::lab
