@@ -44,6 +44,7 @@ bool is_return(const Eigen::Vector3f& p) { return p.allFinite() && !p.isZero(0);
 std::optional<Reason> fault_of(const ImuSample& s) {
   constexpr double absurd_gyro = 300, absurd_accel = 5000;  // rad/s, m/s^2 (or g): beyond any IMU's range
   if (!s.gyro.allFinite() || !s.accel.allFinite()) return Reason::not_finite;
+  if (s.gyro.isZero(0) && s.accel.isZero(0)) return Reason::all_zero;
   return when(s.gyro.norm() > absurd_gyro || s.accel.norm() > absurd_accel, Reason::absurd_value);
 }
 

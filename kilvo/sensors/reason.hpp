@@ -27,6 +27,7 @@ enum class Reason : std::uint8_t {
   // of a message that is not used
   not_used,
   not_finite,
+  all_zero,
   absurd_value,
   absurd_stamp,
   empty,
@@ -112,6 +113,7 @@ inline constexpr std::array reasons = {
     ReasonRow{Reason::camera_useless, Severity::notice, "camera_useless", "images carry no information"},
     ReasonRow{Reason::not_used, Severity::notice, "not_used", "not used"},
     ReasonRow{Reason::not_finite, Severity::warning, "not_finite", "not finite"},
+    ReasonRow{Reason::all_zero, Severity::warning, "all_zero", "zeros only: it does not measure yet, or no longer"},
     ReasonRow{Reason::absurd_value, Severity::warning, "absurd_value", "absurd value"},
     ReasonRow{Reason::absurd_stamp, Severity::warning, "absurd_stamp", "absurd stamp"},
     ReasonRow{Reason::empty, Severity::warning, "empty", "empty"},
@@ -182,7 +184,10 @@ inline constexpr std::array reasons = {
               "measured it. The pose jumps there"},
     ReasonRow{Reason::foreign_images, Severity::warning, "foreign_images", "images of []"},
     ReasonRow{Reason::nothing_seen, Severity::warning, "nothing_seen",
-              "of {} images none showed enough to be used: too dark, blank, blurred or covered; 16 bits must be used to the top", 1, 0},
+              "of {} images none showed enough to be used: too dark, blank, blurred, covered, 16 bits that are not used to the top, or a "
+              "camera that "
+              "is not as described (kilvo doctor)",
+              1, 0},
     ReasonRow{Reason::camera_turned, Severity::warning, "camera_turned",
               "the images fit a camera that is rotated by {} degrees or more ([] about the axes of the IMU) against camera.T_imu_camera.R: "
               "check the calibration and camera.time_offset. Images are not used for some time",

@@ -23,14 +23,34 @@ constexpr double lidar_silent = 2;                     // s, after which nothing
 
 // What the estimator finds and corrects by itself, or only becomes less accurate by, is a warning.
 bool spoils(const Finding& finding) {
-  constexpr std::array<std::string_view, 26> always{"imu_axes",       "imu_rotated",         "gyro_unit",      "joint_unit",
-                                                    "joints_swapped", "joint_names_shifted", "joint_sign",     "point_times_reversed",
-                                                    "lidar_inverted", "lidar_unit",          "imu_link",       "joint_offset",
-                                                    "lidar_axes",     "accel_gravity",       "urdf",           "point_times_unit",
-                                                    "leg_joints",     "sole_unit",           "joint_velocity", "foot_link",
-                                                    "joint_frozen",   "joints_repeated",     "gyro_frozen",    "joint_locked",
-                                                    "lidar_range",    "clouds_deskewed"};
-  constexpr double lidar_turn = 3, imu_turn = 10, time = 0.08, length = 0.2, place = 0.05;  // degrees, s, -, m
+  constexpr std::array<std::string_view, 27> always{"accel_frozen",
+                                                    "imu_axes",
+                                                    "imu_rotated",
+                                                    "gyro_unit",
+                                                    "joint_unit",
+                                                    "joints_swapped",
+                                                    "joint_names_shifted",
+                                                    "joint_sign",
+                                                    "point_times_reversed",
+                                                    "lidar_inverted",
+                                                    "lidar_unit",
+                                                    "imu_link",
+                                                    "joint_offset",
+                                                    "lidar_axes",
+                                                    "accel_gravity",
+                                                    "urdf",
+                                                    "point_times_unit",
+                                                    "leg_joints",
+                                                    "sole_unit",
+                                                    "joint_velocity",
+                                                    "foot_link",
+                                                    "joint_frozen",
+                                                    "joints_repeated",
+                                                    "gyro_frozen",
+                                                    "joint_locked",
+                                                    "lidar_range",
+                                                    "clouds_deskewed"};
+  constexpr double lidar_turn = 3, imu_turn = 6, time = 0.08, length = 0.2, place = 0.05;  // degrees, s, -, m
   if (std::ranges::find(always, finding.cause) != always.end()) return true;
   if (finding.cause == "accel_unit" || finding.cause == "joints_jump") return finding.fatal;
   if (finding.cause == "lidar_position") return finding.size > place;
@@ -194,7 +214,9 @@ WrongDescription DescriptionWatch::as_changed(WrongDescription wrong, Time begin
   wrong.finding.changes.clear();
   wrong.finding.text =
       fmt::format("from {:.0f} to {:.0f} s of data, and not before: {}", to_seconds(begin - *origin_), wrong.after, wrong.finding.text);
-  wrong.finding.remedy = "look for what has failed, slipped or been reset in that time";
+  const std::string& remedy = wrong.finding.remedy;
+  wrong.finding.remedy =
+      "look for what has failed, slipped or been reset in that time" + (remedy.empty() ? "" : ", or was not seen before: " + remedy);
   return wrong;
 }
 

@@ -160,7 +160,7 @@ Diagnosis Examination::run() {
     return diagnosis_;
   }
   examine_acceleration_unit();
-  examine_frozen_gyro();
+  for (const auto half : {&InertialSample::gyro, &InertialSample::accel}) examine_frozen_axes(half);
   register_sweeps();
   agree_with_gyro();
   settle_axes();

@@ -84,7 +84,7 @@ class Examination {
   void examine_gyro_scale(const std::vector<Turn>& turns, const MountFit& fit);
   void refine_gyro_scale(const MountFit& fit);
   void examine_gyro_axes(const Eigen::Vector3d& change, const Eigen::Vector3d& sigma);
-  void examine_frozen_gyro();
+  void examine_frozen_axes(Eigen::Vector3d InertialSample::*half);
   double walked_between(double a, double b) const;
   void accuse_imu_axes(const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel, const std::string& evidence);
   /// `only_calm`: none when what the accelerometer measures does not average to gravity.

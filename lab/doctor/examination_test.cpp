@@ -191,6 +191,17 @@ TEST(Doctor, AnAxisOfTheGyroThatIsFrozenOrOfAnotherScaleIsNamed) {
   EXPECT_THAT(causes(failed, walked().robot), Contains("gyro_frozen"));
 }
 
+TEST(Doctor, AnAxisOfTheAccelerometerThatNeverChangesIsNamed) {
+  Recorded frozen = walked().recorded;
+  frozen.sweeps.clear();
+  for (InertialSample& s : frozen.imu) s.accel.x() = 0;
+  EXPECT_THAT(causes(frozen, walked().robot), Contains("accel_frozen"));
+  Recorded failed = walked().recorded;
+  const std::size_t half = failed.imu.size() / 2;
+  for (std::size_t k = half; k < failed.imu.size(); ++k) failed.imu[k].accel.z() = 0;
+  EXPECT_THAT(causes(failed, walked().robot), Contains("accel_frozen"));
+}
+
 TEST(Doctor, AGyroInDegreesIsNamedByTheLidarAlone) {
   Recorded recorded = walked().recorded;
   recorded.legs.clear();

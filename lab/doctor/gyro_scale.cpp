@@ -153,7 +153,8 @@ double Examination::walked_between(double a, double b) const {
 
 // Noise alone changes each sample of a gyro. One that fails on the way repeats what it measured last; one with a dead band has repeated
 // itself before.
-void Examination::examine_frozen_gyro() {
+// Gyro or accelerometer. A half of an IMU that works does not repeat itself while the robot walks.
+void Examination::examine_frozen_axes(Eigen::Vector3d InertialSample::*half) {
   const std::vector<InertialSample>& imu = recorded_.imu;
   if (imu.empty()) return;
   constexpr double no_chance = 5, rest = 0.2;  // s, for which a sensor that works does not repeat itself while the robot walks, or at all
@@ -162,7 +163,7 @@ void Examination::examine_frozen_gyro() {
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     const std::size_t last = imu.size() - 1;
     const auto first_of_run = [&](std::size_t from) {
-      while (from > 0 && imu[from - 1].gyro[axis] == imu[from].gyro[axis]) --from;
+      while (from > 0 && (imu[from - 1].*half)[axis] == (imu[from].*half)[axis]) --from;
       return from;
     };
     const std::size_t from = first_of_run(last);
@@ -173,18 +174,21 @@ void Examination::examine_frozen_gyro() {
     axes += (axes.empty() ? "" : ", ") + std::string(1, "xyz"[axis]);
     since = std::max(since, from);
   }
-  // A gyro with a dead band may well be silent at rest.
-  RunningStatistics acceleration(0, 0, 0, INFINITY);
-  for (std::size_t k = since; k < imu.size(); ++k) acceleration.add(imu[k].accel.norm(), 1);
-  constexpr double walks = 0.5;  // m/s^2, standard deviation
-  const double moved = acceleration.sigma();
-  if (axes.empty() || moved < walks) return;
+  if (axes.empty()) return;
+  // A sensor with a dead band may well be silent at rest.
+  const bool is_gyro = half == &InertialSample::gyro;
+  RunningStatistics other(0, 0, 0, INFINITY);
+  for (std::size_t k = since; k < imu.size(); ++k) other.add((is_gyro ? imu[k].accel : imu[k].gyro).norm(), 1);
+  constexpr double walks = 0.5, turns = 0.05;  // m/s^2, rad/s: standard deviations
+  if (other.sigma() < (is_gyro ? walks : turns)) return;
+  const std::string name = is_gyro ? "gyro" : "accelerometer", along = is_gyro ? "about " : "along ";
   find({Sensor::imu,
-        "gyro_frozen",
-        since == 0 ? fmt::format("the gyro never changes about {}", axes)
-                   : fmt::format("the gyro has not changed about {} for the last {:.0f} s", axes, imu.back().t - imu[since].t),
-        fmt::format("{} samples are the same, while the acceleration has a standard deviation of {:.1f} m/s^2", imu.size() - since, moved),
-        "the driver must publish what the gyro measures",
+        is_gyro ? "gyro_frozen" : "accel_frozen",
+        since == 0 ? fmt::format("the {} never changes {}{}", name, along, axes)
+                   : fmt::format("the {} has not changed {}{} for the last {:.0f} s", name, along, axes, imu.back().t - imu[since].t),
+        fmt::format("{} samples are the same, while the {} has a standard deviation of {:.2f} {}", imu.size() - since,
+                    is_gyro ? "acceleration" : "turning", other.sigma(), is_gyro ? "m/s^2" : "rad/s"),
+        fmt::format("the driver must publish what the {} measures", name),
         0,
         "",
         {},

@@ -202,8 +202,10 @@ void Examination::examine_leg_rotation() {
       diagnosis_.findings.back().evidence = "turning of the legs against the gyro's: " + detail;
     }
   } else {
-    seems_wrong(Sensor::imu) |= stances.good || accelerates ? angle > leg_rotation_tolerance : !way.empty();
-    const bool is_open = uncertain > 3 || angle > std::max(leg_rotation_tolerance, sure * uncertain);
+    constexpr double vague = 3, likely = 2;  // degrees; standard deviations
+    const bool is_likely = angle > std::max(leg_rotation_tolerance, likely * uncertain);
+    seems_wrong(Sensor::imu) |= is_likely || (stances.good || accelerates ? angle > leg_rotation_tolerance : !way.empty());
+    const bool is_open = uncertain > vague || is_likely;
     check(Sensor::imu, "rotation of its mount on the robot", is_open ? Check::Verdict::unknown : Check::Verdict::good, detail);
   }
   if (stances.good || accelerates) fit.explained = 1;  // the feet stand

@@ -62,6 +62,9 @@ void Examination::examine_feet_apart(const Robot& start) {
   const std::vector<LegPose> path = legs_under(nullptr, 1);
   if (path.empty()) return;
   const Eigen::Vector3d described = path.front().foot[0].p[0] - path.front().foot[1].p[0];
+  // What would leave nearly nothing between the hips is no description, but soles that turn on the ground.
+  constexpr double most_of_it = 0.5;
+  if (2 * std::abs(fit.apart[axis]) > most_of_it * std::abs(described[axis])) return;
   const double farther = std::copysign(2 * fit.apart[axis], fit.apart[axis] * described[axis]);
   find({Sensor::legs,
         "leg_lengths",

@@ -49,7 +49,9 @@ void Recorder::push(const Measurement& measurement) {
 }
 
 void Recorder::take(const ImuSample& sample) {
-  if (sample.gyro.allFinite() && sample.accel.allFinite()) recorded_.imu.push_back({seconds(sample.t), sample.gyro, sample.accel});
+  const bool is_running = !sample.gyro.isZero(0) || !sample.accel.isZero(0);
+  if (is_running && sample.gyro.allFinite() && sample.accel.allFinite())
+    recorded_.imu.push_back({seconds(sample.t), sample.gyro, sample.accel});
 }
 
 void Recorder::count_return(double t, const std::vector<double>& positions) {
