@@ -82,9 +82,9 @@ std::optional<Start> Initialiser::add(const ImuSample& s) {
   window_.push_back(s);
   moving_.push_back(s);
   while (s.t - moving_.front().t > from_seconds(config_.moving_start)) moving_.pop_front();
-  // The shortest run of samples that spans still_time.
-  while (window_.size() > 2 && s.t - window_[1].t >= from_seconds(config_.still_time)) window_.pop_front();
+  // The shortest run of samples that spans still_time, and is long enough for a slow IMU.
   constexpr std::size_t min_samples = 20;
+  while (window_.size() > min_samples && s.t - window_[1].t >= from_seconds(config_.still_time)) window_.pop_front();
   if (s.t - window_.front().t < from_seconds(config_.still_time) || window_.size() < min_samples) return std::nullopt;
 
   const auto gyro = statistics_of(window_, &ImuSample::gyro);

@@ -56,6 +56,15 @@ TEST(Initialiser, StartsAtTheFirstSampleOfHalfASecondAtRest) {
   EXPECT_EQ(start->accel_scale, 1.0);
 }
 
+TEST(Initialiser, StartsWithAnImuOf20Hz) {
+  Initialiser initialiser(InitialConfig{}, true, ProcessNoise{}.accel);
+  std::optional<Start> start;
+  for (int i = 0; i < 40 && !start; ++i)
+    start = initialiser.add({.t = time_from_ns(0) + i * Duration(50'000'000), .gyro = {0.001, 0, 0}, .accel = {0, 0, 9.8}});
+  ASSERT_TRUE(start);
+  EXPECT_TRUE(start->still);
+}
+
 // 2 degrees a second is not unusual for a gyro, and what its axes take for turning while gravity pulls comes on top.
 TEST(Initialiser, StandsStillWithAGyroWhoseBiasIsLarge) {
   const Eigen::Vector3d bias(0.03, -0.04, 0.02);

@@ -84,6 +84,9 @@ TEST(InputQueue, NamesWhatItRefusesAndLetsTheRestThrough) {
   ImuSample broken = imu_at(0.005);
   broken.gyro.x() = NAN;
   q.push(broken);
+  ImuSample off = imu_at(0.005);  // it has not begun to measure
+  off.gyro = off.accel = Eigen::Vector3d::Zero();
+  q.push(off);
   q.push(JointSample{});  // not used
   q.push(LidarScan{});    // empty
   q.push(imu_at(0.005));
@@ -91,7 +94,7 @@ TEST(InputQueue, NamesWhatItRefusesAndLetsTheRestThrough) {
   EXPECT_EQ(popped(q).size(), 2u);
   std::vector<Reason> reasons;
   for (const auto& refusal : q.take_refused()) reasons.push_back(refusal.reason);
-  EXPECT_EQ(reasons, (std::vector{Reason::duplicate, Reason::not_finite, Reason::not_used, Reason::empty}));
+  EXPECT_EQ(reasons, (std::vector{Reason::duplicate, Reason::not_finite, Reason::all_zero, Reason::not_used, Reason::empty}));
   EXPECT_TRUE(q.take_refused().empty()) << "each is named once";
 }
 

@@ -23,7 +23,7 @@ constexpr double lidar_silent = 2;                     // s, after which nothing
 
 // What the estimator finds and corrects by itself, or only becomes less accurate by, is a warning.
 bool spoils(const Finding& finding) {
-  constexpr std::array<std::string_view, 27> always{"accel_frozen",
+  constexpr std::array<std::string_view, 28> always{"accel_frozen",
                                                     "imu_axes",
                                                     "imu_rotated",
                                                     "gyro_unit",
@@ -47,6 +47,7 @@ bool spoils(const Finding& finding) {
                                                     "joint_frozen",
                                                     "joints_repeated",
                                                     "gyro_frozen",
+                                                    "gyro_bias",
                                                     "joint_locked",
                                                     "lidar_range",
                                                     "clouds_deskewed"};
@@ -192,7 +193,7 @@ void DescriptionWatch::judge(Time t) {
     auto work = [robot = robot_, recorder = now_.recorder, begin = *now_.begin, t, earlier = std::move(earlier_)]() mutable {
       const Recorded recorded = recorder.finish();
       const Diagnosis diagnosis = diagnosis_of(recorded, robot, earlier);
-      return Verdict{diagnosis.findings, diagnosis.settled, std::move(earlier), begin, t};
+      return Verdict{diagnosis.findings, diagnosis.settled, std::move(earlier), begin, t, diagnosis.gyro_bias};
     };
     future_ = std::async(judging_ == Judging::here ? std::launch::deferred : std::launch::async, std::move(work));
     if (judging_ == Judging::here) collect();
@@ -220,9 +221,25 @@ WrongDescription DescriptionWatch::as_changed(WrongDescription wrong, Time begin
   return wrong;
 }
 
+// Legs never correct the heading: on them and the IMU alone nothing else would show it.
+void DescriptionWatch::compare_gyro_bias(Verdict& verdict) {
+  if (!verdict.gyro_bias) return;
+  if (!gyro_bias_) gyro_bias_ = verdict.gyro_bias;
+  const double change = verdict.gyro_bias->first - gyro_bias_->first, sigma = std::hypot(verdict.gyro_bias->second, gyro_bias_->second);
+  constexpr double warms_up = 0.015;  // rad/s
+  if (std::abs(change) < std::max(warms_up, sure * sigma)) return;
+  Finding f{Sensor::imu, "gyro_bias", {}, {}, {}, change, "rad/s", {}, true};
+  f.text = fmt::format("the gyro's bias about the vertical has changed by {:.3f} rad/s, by which the heading turns", change);
+  f.evidence = fmt::format("soles that stand turn by {:.3f} rad/s otherwise than the gyro, standard deviation {:.3f}, and by {:.3f} before",
+                           verdict.gyro_bias->first, verdict.gyro_bias->second, gyro_bias_->first);
+  f.remedy = "the gyro: its supply, its temperature, or a driver that subtracts a bias of its own";
+  verdict.findings.push_back(std::move(f));
+}
+
 void DescriptionWatch::collect() {
   if (!future_.valid()) return;
   Verdict verdict = future_.get();
+  compare_gyro_bias(verdict);
   earlier_ = std::move(verdict.earlier);
   std::vector<Doubt> doubts;
   for (const Finding& finding : verdict.findings) {
@@ -231,7 +248,9 @@ void DescriptionWatch::collect() {
       // A window among many may err: the next one must show it as well, but for sensors that repeat themselves, which none does by chance.
       const auto before = std::ranges::find(doubts_, finding.cause, &Doubt::cause);
       doubts.push_back({finding.cause, before != doubts_.end() ? before->begin : verdict.begin});
-      wrong.spoils &= before != doubts_.end() || finding.cause.ends_with("_frozen");
+      constexpr double by_no_chance = 0.03;  // rad/s
+      const bool is_sure = finding.cause.ends_with("_frozen") || (finding.cause == "gyro_bias" && std::abs(finding.size) > by_no_chance);
+      wrong.spoils &= before != doubts_.end() || is_sure;
       wrong = as_changed(std::move(wrong), doubts.back().begin);
     }
     const auto same = [&wrong](const WrongDescription& w) {

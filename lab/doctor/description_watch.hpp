@@ -51,7 +51,9 @@ class DescriptionWatch {
     bool known = false;  // nothing that more data could show was left open
     Earlier earlier;
     Time begin{}, t{};
+    std::optional<std::pair<double, double>> gyro_bias;  // see Diagnosis
   };
+  void compare_gyro_bias(Verdict& verdict);
   void begin(Time t);
   void begin_anew();
   bool needs_whole() const;
@@ -83,12 +85,13 @@ class DescriptionWatch {
     std::string cause;
     Time begin{};  // of the first of the windows that show it
   };
-  std::vector<Doubt> doubts_;  // of the last window, when all was known before
-  bool over_ = false;          // no more is judged
-  bool first_ = true;          // window: judged even when the robot stands, for units and rates
-  int windows_ = 0;            // in which the robot moved
-  Earlier earlier_;            // what the judgement before has shown
-  double turned_ = 0;          // rad, by the gyro in this window
+  std::optional<std::pair<double, double>> gyro_bias_;  // of the first window that showed it
+  std::vector<Doubt> doubts_;                           // of the last window, when all was known before
+  bool over_ = false;                                   // no more is judged
+  bool first_ = true;                                   // window: judged even when the robot stands, for units and rates
+  int windows_ = 0;                                     // in which the robot moved
+  Earlier earlier_;                                     // what the judgement before has shown
+  double turned_ = 0;                                   // rad, by the gyro in this window
   std::optional<Time> last_imu_;
   std::future<Verdict> future_;
   std::vector<WrongDescription> found_;

@@ -66,6 +66,11 @@ void freeze_gyro_early(Measurement& m, double t) {
   if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && t > 14.1) imu->gyro.z() = 0.1;
 }
 
+// The IMU of the simulation hangs as that of a G1: z down.
+void shift_gyro(Measurement& m, double t) {
+  if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && t > failure) imu->gyro.z() += 0.05;
+}
+
 void turn_knee_round(Measurement& m, double t) {
   auto* legs = std::get_if<JointSample>(&m);
   if (legs == nullptr || legs->names.empty() || t < failure) return;
@@ -81,8 +86,8 @@ TEST(DescriptionWatch, HasNothingAgainstLegsAndImuThatStayRight) {
 }
 
 TEST(DescriptionWatch, ReportsWhatChangesOnTheWay) {
-  const std::vector<std::pair<std::string, std::function<void(Measurement&, double)>>> faults{{"gyro_frozen", freeze_gyro},
-                                                                                              {"joint_sign", turn_knee_round}};
+  const std::vector<std::pair<std::string, std::function<void(Measurement&, double)>>> faults{
+      {"gyro_frozen", freeze_gyro}, {"gyro_bias", shift_gyro}, {"joint_sign", turn_knee_round}};
   for (const auto& [cause, fault] : faults) {
     const std::vector<WrongDescription> here = watched(DescriptionWatch::Judging::here, fault);
     ASSERT_FALSE(here.empty()) << cause;
@@ -103,6 +108,17 @@ TEST(DescriptionWatch, ReportsWhatChangesOnTheWay) {
       EXPECT_EQ(beside[i].t, here[i].t);
     }
   }
+}
+
+TEST(DescriptionWatch, MeasuresByHowMuchTheBiasOfTheGyroHasChanged) {
+  const std::vector<WrongDescription> wrong = watched(DescriptionWatch::Judging::here, shift_gyro);
+  ASSERT_FALSE(wrong.empty());
+  EXPECT_NEAR(std::abs(wrong[0].finding.size), 0.05, 0.01);
+  EXPECT_THAT(watched(DescriptionWatch::Judging::here,
+                      [](Measurement& m, double t) {
+                        if (auto* imu = std::get_if<ImuSample>(&m)) imu->gyro.z() += 1e-4 * t;  // warms up by 0.0076 rad/s
+                      }),
+              IsEmpty());
 }
 
 // One window may err: a recording that ends with it has a warning.

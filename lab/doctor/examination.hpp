@@ -162,6 +162,7 @@ class Examination {
   MountFit measure_leg_mount() const;
   StanceFit standing_by(Robot& start, const MountFit& by_turning, double method) const;
   void examine_leg_rotation();
+  std::pair<double, double> vertical_bias(const MountFit& fit) const;
   bool find_inclined_imu(const MountFit& fit, double method);
   void examine_leg_clock(const MountFit& fit, double method, double tolerance);
   bool turns_with_link(const LegHypothesis& other) const;

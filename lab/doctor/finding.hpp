@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kilvo/sensors/measurement.hpp"
@@ -50,6 +52,8 @@ struct Diagnosis {
   std::vector<Check> checks;
   bool settled = false;                          // each sense that is there moved enough to be judged
   std::array<bool, sensor_count> seems_wrong{};  // and more data would make it sure
+  /// Bias of the gyro about the vertical by the turning of soles that stand, rad/s, and its standard deviation: without a LiDAR.
+  std::optional<std::pair<double, double>> gyro_bias = std::nullopt;
   bool good() const { return findings.empty(); }
   /// Nothing could be judged at all.
   bool unknown() const;

@@ -110,6 +110,16 @@ StanceFit Examination::standing_by(Robot& start, const MountFit& by_turning, dou
   return by_turned;
 }
 
+std::pair<double, double> Examination::vertical_bias(const MountFit& fit) const {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  for (const InertialSample& s : recorded_.imu) force += s.accel;
+  const Eigen::Vector3d up = (accel_axes_ * force).normalized();
+  // Soles that turn on the ground: between windows of 30 s of six sound walks of levels 1 and 2 it differs by 0.003 at the most.
+  constexpr double of_soles = 0.003;  // rad/s
+  const Eigen::Vector3d sigma(fit.fit.sigma(4), fit.fit.sigma(5), fit.fit.sigma(6));
+  return {up.dot(fit.bias), std::hypot(of_soles, up.cwiseProduct(sigma).norm())};
+}
+
 // The turning knows the mount to some degrees, the soles its inclination: both together.
 bool Examination::find_inclined_imu(const MountFit& fit, double method) {
   const SO3 described = robot_.imu.T_link_imu.R.inverse();
@@ -142,6 +152,7 @@ bool Examination::find_inclined_imu(const MountFit& fit, double method) {
 void Examination::examine_leg_rotation() {
   const SO3 described = robot_.imu.T_link_imu.R.inverse();
   MountFit fit = measure_leg_mount();
+  if (fit.fit.good && legs_turned() && lidar_way().empty()) diagnosis_.gyro_bias = vertical_bias(fit);
   // What soles that roll and links that bend shift both by shows in what is not explained.
   const double unexplained = std::max(0.0, 1 - fit.explained);
   double method = 0.2 + 10 * unexplained, clock_method = 0.001 + 0.04 * unexplained;  // degrees, s
