@@ -23,33 +23,20 @@ constexpr double lidar_silent = 2;                     // s, after which nothing
 
 // What the estimator finds and corrects by itself, or only becomes less accurate by, is a warning.
 bool spoils(const Finding& finding) {
-  constexpr std::array<std::string_view, 28> always{"accel_frozen",
-                                                    "imu_axes",
-                                                    "imu_rotated",
-                                                    "gyro_unit",
-                                                    "joint_unit",
-                                                    "joints_swapped",
-                                                    "joint_names_shifted",
-                                                    "joint_sign",
-                                                    "point_times_reversed",
-                                                    "lidar_inverted",
-                                                    "lidar_unit",
-                                                    "imu_link",
-                                                    "joint_offset",
-                                                    "lidar_axes",
-                                                    "accel_gravity",
-                                                    "urdf",
-                                                    "point_times_unit",
-                                                    "leg_joints",
-                                                    "sole_unit",
-                                                    "joint_velocity",
-                                                    "foot_link",
-                                                    "joint_frozen",
-                                                    "joints_repeated",
-                                                    "gyro_frozen",
-                                                    "gyro_bias",
-                                                    "joint_locked",
-                                                    "lidar_range",
+  constexpr std::array<std::string_view, 29> always{"accel_frozen",   "joint_slip",
+                                                    "imu_axes",       "imu_rotated",
+                                                    "gyro_unit",      "joint_unit",
+                                                    "joints_swapped", "joint_names_shifted",
+                                                    "joint_sign",     "point_times_reversed",
+                                                    "lidar_inverted", "lidar_unit",
+                                                    "imu_link",       "joint_offset",
+                                                    "lidar_axes",     "accel_gravity",
+                                                    "urdf",           "point_times_unit",
+                                                    "leg_joints",     "sole_unit",
+                                                    "joint_velocity", "foot_link",
+                                                    "joint_frozen",   "joints_repeated",
+                                                    "gyro_frozen",    "gyro_bias",
+                                                    "joint_locked",   "lidar_range",
                                                     "clouds_deskewed"};
   constexpr double lidar_turn = 3, imu_turn = 6, time = 0.08, length = 0.2, place = 0.05;  // degrees, s, -, m
   if (std::ranges::find(always, finding.cause) != always.end()) return true;
@@ -244,12 +231,14 @@ void DescriptionWatch::collect() {
   std::vector<Doubt> doubts;
   for (const Finding& finding : verdict.findings) {
     WrongDescription wrong = as_wrong(finding, verdict.t, to_seconds(verdict.t - *origin_));
+    wrong.has_changed = finding.cause == "joint_slip";
     if (known_) {
       // A window among many may err: the next one must show it as well, but for sensors that repeat themselves, which none does by chance.
       const auto before = std::ranges::find(doubts_, finding.cause, &Doubt::cause);
       doubts.push_back({finding.cause, before != doubts_.end() ? before->begin : verdict.begin});
       constexpr double by_no_chance = 0.03;  // rad/s
-      const bool is_sure = finding.cause.ends_with("_frozen") || (finding.cause == "gyro_bias" && std::abs(finding.size) > by_no_chance);
+      const bool is_sure = finding.cause.ends_with("_frozen") || finding.cause == "joint_slip" ||
+                           (finding.cause == "gyro_bias" && std::abs(finding.size) > by_no_chance);
       wrong.spoils &= before != doubts_.end() || is_sure;
       wrong = as_changed(std::move(wrong), doubts.back().begin);
     }

@@ -81,6 +81,25 @@ void turn_knee_round(Measurement& m, double t) {
   if (i < legs->velocity.size()) legs->velocity[i] *= -1;
 }
 
+void slip_knee(Measurement& m, double t, double from) {
+  auto* legs = std::get_if<JointSample>(&m);
+  if (legs == nullptr || legs->names.empty() || t < from) return;
+  const auto knee = std::ranges::find(legs->names, "left_knee_joint");
+  ASSERT_NE(knee, legs->names.end());
+  legs->position[static_cast<std::size_t>(knee - legs->names.begin())] += 0.3;
+}
+
+TEST(DescriptionWatch, NamesAJointThatJumpsAndStaysThere) {
+  for (const double from : {failure, 5.0}) {
+    const std::vector<WrongDescription> wrong =
+        watched(DescriptionWatch::Judging::here, [from](Measurement& m, double t) { slip_knee(m, t, from); });
+    const auto slip = std::ranges::find(wrong, "joint_slip", [](const WrongDescription& w) { return w.finding.cause; });
+    ASSERT_NE(slip, wrong.end()) << from;
+    EXPECT_THAT(slip->finding.text, HasSubstr("left_knee_joint has jumped by 0.30 rad"));
+    EXPECT_TRUE(slip->spoils && slip->has_changed);
+  }
+}
+
 TEST(DescriptionWatch, HasNothingAgainstLegsAndImuThatStayRight) {
   EXPECT_THAT(watched(DescriptionWatch::Judging::here, [](Measurement&, double) {}), IsEmpty());
 }

@@ -120,6 +120,7 @@ class Examination {
   bool examine_leg_names();
   void examine_length_units();
   bool examine_joint_values();
+  void find_joint_slip();
   bool joints_jump();
   void examine_locked_joints();
   /// Legs that hardly turn show how they bend, not how they are mounted.

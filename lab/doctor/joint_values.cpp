@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fmt/core.h>
 #include <fmt/format.h>
+#include <map>
 
 #include "kilvo/math/running_statistics.hpp"
 #include "lab/doctor/examination.hpp"
@@ -123,9 +124,38 @@ bool Examination::joints_jump() {
   return share > few;
 }
 
+// An encoder that slips or loses its zero, a gear that jumps a tooth.
+void Examination::find_joint_slip() {
+  constexpr double least = 0.1;       // rad
+  constexpr double longest = 0.0055;  // s: of slower messages a step of a walk is as large (T1, 50 Hz: 0.5 rad)
+  if (!(recorded_.stamps[static_cast<std::size_t>(Sensor::legs)].period < longest)) return;
+  std::map<std::size_t, JointStep> sums;
+  for (const JointStep& step : recorded_.joint_steps) {
+    JointStep& sum = sums.try_emplace(step.joint, JointStep{step.t, step.joint, 0}).first->second;
+    sum.size += step.size;
+  }
+  for (const std::size_t joint : recorded_legs_.joints_that_matter(robot_)) {
+    const auto sum = sums.find(joint);
+    if (sum == sums.end() || std::abs(sum->second.size) < least) continue;
+    const double size = sum->second.size;
+    find({Sensor::legs,
+          "joint_slip",
+          fmt::format("the position of {} has jumped by {:.2f} rad and stays there", recorded_.joint_names[joint], size),
+          fmt::format("from one message to the next, {:.1f} s after the first one that was looked at, and no other joint",
+                      sum->second.t - recorded_.legs.front().t),
+          "the encoder or its coupling; until then robot.joints with another zero of that joint",
+          size,
+          "rad",
+          {},
+          true});
+    return;
+  }
+}
+
 // False when the legs cannot be judged with these values.
 bool Examination::examine_joint_values() {
   if (joints_jump()) return false;
+  if (!recorded_.legs.empty()) find_joint_slip();
   const std::vector<std::size_t> joints = recorded_legs_.joints_that_matter(robot_);
   const std::vector<Range> ranges = ranges_of(recorded_.legs, recorded_.joint_names.size());
   const std::vector<std::string>& names = recorded_.joint_names;

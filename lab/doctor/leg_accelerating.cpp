@@ -74,6 +74,12 @@ Directions directions_of(const JointTurns& joint) {
   return out;
 }
 
+// Legs that are exchanged as a whole turn as they did: what is left by the acceleration is 0.2 to 0.5 of that before on seven walks.
+bool explains_an_exchange(const LegAcceleration& exchanged, const LegAcceleration& described) {
+  constexpr double half = 0.55, mostly = 0.8;
+  return exchanged.explained > mostly && exchanged.differs() < half * described.differs();
+}
+
 }  // namespace
 
 LegAcceleration Examination::leg_acceleration(const LegHypothesis* hypothesis, const SO3& R_link_imu, double offset) const {
@@ -135,9 +141,7 @@ bool Examination::try_acceleration_hypotheses() {
       return (c.R * R.inverse()).Log().norm() > alone_tolerance || std::abs(c.fit.offset - leg_offset_) > alone_clock_tolerance;
     // Another link is none that only moves as far.
     if (c.legs->cause == "foot_link" && c.fit.differs() > 1 - described.explained) return false;
-    // Legs that are exchanged as a whole turn as they did: what is left by the acceleration is 0.2 to 0.5 of that before on seven walks.
-    constexpr double half = 0.55, mostly = 0.8;
-    if (c.legs->cause == "joints_swapped") return c.fit.explained > mostly && c.fit.differs() < half * described.differs();
+    if (c.legs->cause == "joints_swapped") return explains_an_exchange(c.fit, described);
     // What turns as the gyro does accelerates nearly as well.
     return turning_is_hidden || c.fit.explained > well;
   };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -54,6 +55,30 @@ void Recorder::take(const ImuSample& sample) {
     recorded_.imu.push_back({seconds(sample.t), sample.gyro, sample.accel});
 }
 
+// From the message before the last to the last one, and there since.
+void Recorder::note_steps(double t, const std::vector<double>& positions) {
+  constexpr double jump = 0.1, faster_than_any = 40;  // rad, rad/s
+  constexpr std::size_t most = 16, fewest_others = 3;
+  const auto& [first, middle] = before_;
+  std::vector<JointStep> steps;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    // One that turns on and on is a turn further.
+    const double there = std::remainder(middle.position[i] - first.position[i], 2 * std::numbers::pi),
+                 on = positions[i] - middle.position[i];
+    const bool is_fast = std::abs(there) > faster_than_any * std::max(middle.t - first.t, (t - first.t) / 2);
+    // A joint that turns the other way round from now on is another mistake.
+    const bool is_mirrored = std::abs(middle.position[i] + first.position[i]) < 0.25 * std::abs(there);
+    const bool is_step = std::abs(there) >= jump && is_fast && !is_mirrored && std::abs(on) < 0.25 * std::abs(there);
+    if (is_step) steps.push_back({middle.t, i, there});
+  }
+  // All at once are of a driver that begins, or of another robot.
+  constexpr std::size_t at_once = 2;
+  if (steps.size() > at_once || positions.size() < at_once + fewest_others) return;
+  for (const JointStep& step : steps) {
+    if (recorded_.joint_steps.size() < most) recorded_.joint_steps.push_back(step);
+  }
+}
+
 void Recorder::count_return(double t, const std::vector<double>& positions) {
   constexpr double at_once = 0.03, jump = 0.1;  // s, rad: 900 rad/s^2 and more
   ++recorded_.joint_messages;
@@ -70,6 +95,7 @@ void Recorder::count_return(double t, const std::vector<double>& positions) {
     ++returns.count;
     returns.largest = std::max(returns.largest, size);
   }
+  if (comparable && is_in_time) note_steps(t, positions);
   std::swap(first, middle);
   middle.t = t;
   middle.position = positions;

@@ -56,6 +56,13 @@ struct Reading {
   bool all_points = false;          // of the sweeps (16 bytes each), to be registered as exactly as they can be: else some thousand
 };
 
+/// A joint that reads another position from one message to the next, while the others go on.
+struct JointStep {
+  double t = 0;  // s
+  std::size_t joint = 0;
+  double size = 0;  // rad
+};
+
 /// Times are seconds since `origin`, the first stamp of all.
 struct Recorded {
   std::int64_t origin = 0;  // ns
@@ -69,6 +76,7 @@ struct Recorded {
   std::array<StampStatistics, sensor_count> stamps;
   std::size_t joint_messages = 0;           // with these names
   std::vector<JointReturns> joint_returns;  // of each joint
+  std::vector<JointStep> joint_steps;       // the first few
   Reading reading;
 };
 
@@ -89,6 +97,7 @@ class Recorder {
   void take(const JointSample& sample);
   void take(const LidarScan& scan);
   void take(const CameraImage& image);
+  void note_steps(double t, const std::vector<double>& positions);
   void count_return(double t, const std::vector<double>& positions);
 
   Recorded recorded_;
