@@ -173,8 +173,9 @@ TEST_F(Judged, AGapOfTheImuIsReportedWithWhatItLeavesUncertain) {
   findings_.report_gap(situation(), 9);
   const auto events = findings_.take_events();
   ASSERT_EQ(events.size(), 2U);
-  EXPECT_EQ(text_of(events[0]), "imu: after 2.5 s without it position and heading are uncertain by 3.0 m and 29 degrees, one sigma, until "
-                                "the robot is found in its map");
+  EXPECT_EQ(text_of(events[0]),
+            "imu: after 2.5 s without it position and heading are uncertain by 3.0 m and 29 degrees, one sigma, until "
+            "the robot is found in its map");
   EXPECT_THAT(text_of(events[1]), HasSubstr("by 3.0 m and 180 degrees"));
 }
 

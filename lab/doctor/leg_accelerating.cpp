@@ -74,6 +74,8 @@ Directions directions_of(const JointTurns& joint) {
   return out;
 }
 
+constexpr double well = 0.95;  // of the acceleration
+
 // Legs that are exchanged as a whole turn as they did: what is left by the acceleration is 0.2 to 0.5 of that before on seven walks.
 bool explains_an_exchange(const LegAcceleration& exchanged, const LegAcceleration& described) {
   constexpr double half = 0.55, mostly = 0.8;
@@ -104,7 +106,6 @@ bool Examination::try_acceleration_hypotheses() {
   const std::vector<LegPose> path = legs_under(nullptr);
   const MeasuredForce force(mended_imu(), gyro());
   const LegAcceleration described = leg_acceleration(path, force, R, leg_offset_);
-  constexpr double well = 0.95;  // of the acceleration
   if (described.rows == 0 || described.explained > well) return false;
   if (turning_is_hidden && find_accelerated_mount(path, force, described)) return true;
   struct Candidate {
@@ -141,8 +142,8 @@ bool Examination::try_acceleration_hypotheses() {
       return (c.R * R.inverse()).Log().norm() > alone_tolerance || std::abs(c.fit.offset - leg_offset_) > alone_clock_tolerance;
     // Another link is none that only moves as far.
     if (c.legs->cause == "foot_link" && c.fit.differs() > 1 - described.explained) return false;
-    if (c.legs->cause == "joints_swapped") return explains_an_exchange(c.fit, described);
     // What turns as the gyro does accelerates nearly as well.
+    if (c.legs->cause == "joints_swapped") return explains_an_exchange(c.fit, described);
     return turning_is_hidden || c.fit.explained > well;
   };
   const Candidate* best = nullptr;
