@@ -231,7 +231,7 @@ void DescriptionWatch::collect() {
   std::vector<Doubt> doubts;
   for (const Finding& finding : verdict.findings) {
     WrongDescription wrong = as_wrong(finding, verdict.t, to_seconds(verdict.t - *origin_));
-    wrong.has_changed = finding.cause == "joint_slip";
+    wrong.has_changed = finding.cause == "joint_slip" || finding.cause == "gyro_bias";
     if (known_) {
       // A window among many may err: the next one must show it as well, but for sensors that repeat themselves, which none does by chance.
       const auto before = std::ranges::find(doubts_, finding.cause, &Doubt::cause);

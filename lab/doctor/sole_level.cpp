@@ -84,10 +84,10 @@ std::optional<SoleLevel> sole_level(const std::vector<LegPose>& path, const std:
                                     const SO3& R_link_imu, double offset, const std::function<bool(double)>& walks) {
   if (path.empty() || imu.empty() || !normal_of(path.front().foot[0]) || !normal_of(path.front().foot[1])) return std::nullopt;
   const Eigen::Matrix3d R = R_link_imu.matrix();
-  Eigen::Matrix<double, 3, 2> level;  // a basis of the horizontal plane, in the link
+  Eigen::Matrix<double, 3, 2> level = Eigen::Matrix<double, 3, 2>::Zero();  // a basis of the horizontal plane, in the link
   std::vector<Tilt> tilts;
   std::optional<Eigen::Quaterniond> first;
-  Eigen::Vector3d up_first;
+  Eigen::Vector3d up_first = Eigen::Vector3d::Zero();
   auto sample = imu.begin();
   auto pose = path.begin();
   for (double begin = std::max(imu.front().t, path.front().t + offset); gyro.covers(begin, begin + window); begin += window) {
