@@ -61,7 +61,10 @@ void SensorClocks::Stream::add(Time arrived, Duration delay) {
   while (delays.size() > fewest && arrived - delays.front().arrived > evidence) delays.pop_front();
 }
 
-SensorClocks::SensorClocks(const std::array<double, sensor_count>& time_offsets) : time_offsets_(time_offsets) { forget_steps(); }
+SensorClocks::SensorClocks(const std::array<double, sensor_count>& time_offsets)
+    : time_offsets_(time_offsets), imu_delays_(other_evidence) {
+  forget_steps();
+}
 
 void SensorClocks::note(const Measurement& m, Time arrived) {
   const Sensor sensor = sensor_of(m);
@@ -70,11 +73,12 @@ void SensorClocks::note(const Measurement& m, Time arrived) {
   follow_steps(sensor, stamp_of(m), arrived);
   if (stream.steps.pending()) return;
   const Duration correction = stream.steps.correction();
-  follow_drift(stream, arrived, arrived - stamp_of(m) - correction);
+  const Time now = unset(arrived);
+  if (!is_arrival_unclear_) follow_drift(stream, now, now - stamp_of(m) - correction);
   if (is_given_up_ || stream.is_judged) return;
-  stream.add(arrived, arrived - completion_of(m) - correction);
+  stream.add(now, now - completion_of(m) - correction);
   for (const Sensor other : all_sensors) {
-    if (is_to_be_judged(other) && (other == sensor || sensor == Sensor::imu)) judge(other, arrived);
+    if (is_to_be_judged(other) && (other == sensor || sensor == Sensor::imu)) judge(other, now);
   }
 }
 
@@ -83,45 +87,81 @@ void SensorClocks::give_up() {
   for (Stream& stream : streams_) stream.steps.interrupt();
 }
 
+void SensorClocks::wait_no_longer() {
+  if (std::ranges::any_of(all_sensors, [this](Sensor s) { return is_to_be_judged(s); })) return give_up();
+  for (Stream& stream : streams_) {
+    if (stream.steps.pending()) stream.steps.interrupt();
+  }
+}
+
 void SensorClocks::follow_arrival(Sensor s, Time stamp, Time arrived) {
-  if (newest_ && *newest_ - arrived > one_clock) {  // another recording
-    set_ahead_ = Duration(0);
-    forget_steps();
-  }
-  if (imu_ && !is_arrival_unclear_ && arrived - *newest_ > silence) {
-    is_arrival_unclear_ = true;
-    heard_again_.reset();
-    delay_before_ = imu_->arrived - imu_->stamp;
-  }
-  newest_ = arrived;
-  if (s != Sensor::imu) return;
+  if (imu_ && arrived - *newest_ > silence) doubt_arrival();
+  newest_ = std::max(newest_.value_or(arrived), arrived);
+  if (s != Sensor::imu || goes_back(stamp, arrived)) return;
   const auto before = std::exchange(imu_, Message{stamp, arrived});
+  if (is_arrival_unclear_ && before) compare_arrival(stamp - before->stamp, stamp, arrived);
+  if (!is_arrival_unclear_ && !streams_[index_of(s)].steps.pending()) imu_delays_.add(unset(arrived), imu_delay(stamp, arrived));
+}
+
+// One message of the IMU may be out of its order; more are of another recording, or the clock of arrival was set back.
+bool SensorClocks::goes_back(Time stamp, Time arrived) {
+  const bool is_back = imu_ && imu_->arrived - arrived > one_clock, is_out_of_order = is_back && stamp < imu_->stamp;
+  const bool was_out_of_order = std::exchange(is_out_of_order_, is_out_of_order);
+  if (!is_back) return false;
+  if (is_out_of_order && !was_out_of_order) return true;
+  newest_ = arrived;
+  if (!is_out_of_order) {
+    doubt_arrival();
+    return false;
+  }
+  forget_steps();
+  set_ahead_ = Duration(0);
+  imu_delays_ = LeastDelay(other_evidence);
+  is_arrival_unclear_ = false;
+  imu_.reset();
+  return false;
+}
+
+void SensorClocks::doubt_arrival() {
+  if (is_arrival_unclear_) return;
+  is_arrival_unclear_ = true;
+  heard_again_.reset();
+  for (Stream& stream : streams_) stream.steps.postpone();
+}
+
+// Where the IMU's messages only waited, they come in a burst and then as ever; one that is noted late comes as ever.
+void SensorClocks::compare_arrival(Duration went_on, Time stamp, Time arrived) {
+  const Duration delay = imu_delay(stamp, arrived), later = delay - imu_delays_.value();
+  is_arrival_unclear_ = went_on > Duration(0) && went_on < silence && (later > silence / 2 || later < -one_clock / 2);
   if (!is_arrival_unclear_) return;
-  // Where the IMU's messages only waited, they come in a burst and then as ever.
-  if (!heard_again_) heard_again_ = arrived;
-  const Duration went_on = stamp - before->stamp, later = arrived - stamp - delay_before_;
-  is_arrival_unclear_ = went_on > Duration(0) && went_on < silence && later > silence / 2;
-  if (!is_arrival_unclear_ || arrived - *heard_again_ < other_evidence) return;
-  set_ahead_ += later;
+  if (!heard_again_) heard_again_.emplace(other_evidence);
+  heard_again_->add(arrived, delay);
+  if (heard_again_->observed() < other_evidence) return;
+  set_ahead_ += heard_again_->value() - imu_delays_.value();
   is_arrival_unclear_ = false;
 }
 
 void SensorClocks::follow_steps(Sensor s, Time stamp, Time arrived) {
   follow_arrival(s, stamp, arrived);
   StampSteps& steps = streams_[index_of(s)].steps;
-  if (is_arrival_unclear_) return;
-  if (!imu_ || arrived - imu_->arrived > silence) return steps.interrupt();
+  if (!imu_ || arrived - imu_->arrived > silence) return steps.postpone();
+  if (is_arrival_unclear_ || (s == Sensor::imu && is_out_of_order_)) return;
   const auto jump = steps.pending();
   const int count = steps.count();
-  steps.note(stamp, arrived, set_ahead_);
-  if (s == Sensor::imu && steps.count() > count && is_replay(*jump)) forget_steps();
+  steps.note(stamp, unset(arrived));
+  if (s == Sensor::imu && steps.count() > count && is_replay(*jump, unset(arrived))) forget_steps();
 }
 
 // All go back together, by more than a clock does that is disciplined: a recording is played again, and has its own stamps.
-bool SensorClocks::is_replay(Duration imu_jump) const {
-  return imu_jump < -most_early && std::ranges::any_of(streams_, [imu_jump](const Stream& stream) {
-           return stream.steps.pending() && std::chrono::abs(*stream.steps.pending() - imu_jump) < one_clock;
-         });
+bool SensorClocks::is_replay(Duration imu_jump, Time now) const {
+  int heard = 0, together = 0;
+  for (const Sensor s : all_sensors) {
+    const StampSteps& steps = streams_[index_of(s)].steps;
+    if (s == Sensor::imu || !steps.heard() || now - *steps.heard() > other_evidence / 2) continue;
+    ++heard;
+    together += steps.pending() && std::chrono::abs(*steps.pending() - imu_jump) < one_clock ? 1 : 0;
+  }
+  return imu_jump < -most_early && heard > 0 && together == heard;
 }
 
 void SensorClocks::forget_steps() {
@@ -166,7 +206,8 @@ void SensorClocks::judge(Sensor s, Time arrived) {
 
 void SensorClocks::correct(Measurement& m, Time arrived) const {
   const Stream& stream = streams_[index_of(sensor_of(m))];
-  const Duration by = stream.offset.value_or(Duration(0)) + stream.drift.correction() + stream.steps.correction_at(arrived);
+  const Duration step = is_arrival_unclear_ ? stream.steps.correction() : stream.steps.correction_at(unset(arrived));
+  const Duration by = stream.offset.value_or(Duration(0)) + stream.drift.correction() + step;
   std::visit([by](auto& x) { x.t += by; }, m);
 }
 

@@ -6,7 +6,7 @@
 // its stamps are moved by one constant onto the IMU's: so that its least delay is the IMU's. What jitters in the arrival does not enter. Of
 // several sensors with one such clock the one with the shortest way tells for all. Clocks that are not disciplined drift apart; that is
 // followed (ClockDrift). A clock that is set while the robot walks is followed as well, by the times of arrival (StampSteps). Where it is
-// the clock of arrival, nothing arrives for that time, and the IMU's stamps go on.
+// the clock of arrival, nothing arrives for that time or time goes back, and the IMU's stamps go on.
 #pragma once
 
 #include <algorithm>
@@ -17,6 +17,7 @@
 
 #include "kilvo/sensors/measurement.hpp"
 #include "lab/clocks/clock_drift.hpp"
+#include "lab/clocks/least_delay.hpp"
 #include "lab/clocks/stamp_steps.hpp"
 
 namespace kilvo::lab {
@@ -38,6 +39,8 @@ class SensorClocks {
 
   /// No more is waited for: sensors that are not judged yet have the IMU's clock, and jumps are no steps.
   void give_up();
+  /// Something has been waited for too long: the same of that.
+  void wait_no_longer();
 
   /// Onto the IMU's clock, of a sensor that is known, and as the IMU's was at first.
   void correct(Measurement& m, Time arrived) const;
@@ -69,9 +72,14 @@ class SensorClocks {
     double known_drift = 0;  // the newest that was not 0
     StampSteps steps;
   };
+  Time unset(Time arrived) const { return arrived - set_ahead_; }
+  Duration imu_delay(Time stamp, Time arrived) const { return unset(arrived) - stamp - streams_[index_of(Sensor::imu)].steps.correction(); }
   void follow_arrival(Sensor s, Time stamp, Time arrived);
+  bool goes_back(Time stamp, Time arrived);
+  void doubt_arrival();
+  void compare_arrival(Duration went_on, Time stamp, Time arrived);
   void follow_steps(Sensor s, Time stamp, Time arrived);
-  bool is_replay(Duration imu_jump) const;
+  bool is_replay(Duration imu_jump, Time now) const;
   void forget_steps();
   bool is_to_be_judged(Sensor s) const { return s != Sensor::imu && !streams_[index_of(s)].is_judged && streams_[index_of(s)].first; }
   void judge(Sensor s, Time arrived);
@@ -84,12 +92,13 @@ class SensorClocks {
   struct Message {
     Time stamp, arrived;
   };
-  std::optional<Message> imu_;       // the newest one
-  std::optional<Time> newest_;       // arrival of any message
-  bool is_arrival_unclear_ = false;  // nothing has arrived for a while: the clock of arrival may have been set ahead meanwhile
-  std::optional<Time> heard_again_;  // the first message of the IMU after that arrived
-  Duration delay_before_{};          // of the last one before
-  Duration set_ahead_{};             // by which the clock of arrival has been
+  std::optional<Message> imu_;             // the newest one
+  LeastDelay imu_delays_;                  // of late, by the clock of arrival as it was at first
+  std::optional<Time> newest_;             // arrival of any message
+  bool is_out_of_order_ = false;           // the newest message of the IMU
+  bool is_arrival_unclear_ = false;        // the clock of arrival may have been set
+  std::optional<LeastDelay> heard_again_;  // of the IMU's messages since then
+  Duration set_ahead_{};                   // by which the clock of arrival has been
 };
 
 }  // namespace kilvo::lab

@@ -16,6 +16,10 @@ constexpr Duration longest_wait = std::chrono::seconds(3);  // for so many messa
 // A clock that goes back by more may be a recording that is played again: all the others have to show it.
 constexpr Duration far_back = std::chrono::seconds(2);
 constexpr int patience = 6;  // as long then
+// What was observed longer ago tells nothing: clocks drift.
+constexpr Duration memory = std::chrono::minutes(1);
+// A jump ahead is a step where messages come sooner than they ever did for so long, or by more than any driver keeps them.
+constexpr Duration long_enough = std::chrono::seconds(3), longest_queue = std::chrono::seconds(10);
 // Share of a step by which the delays may differ from it.
 constexpr double tolerated_share = 0.3;
 
@@ -29,17 +33,23 @@ Duration median_of(const Delays& delays) {
 
 }  // namespace
 
+StampSteps::StampSteps(Duration observed_for) : observed_for_(observed_for), least_(memory) {}
+
+void StampSteps::postpone() {
+  if (jump_) last_ = std::exchange(jump_, std::nullopt)->before;
+}
+
 void StampSteps::interrupt() {
   jump_.reset();
   delays_.clear();
   last_.reset();
 }
 
-void StampSteps::note(Time stamp, Time arrived, Duration set_ahead) {
-  const Time then = arrived - set_ahead;
-  const Duration delay = then - stamp - correction_;
-  const auto before = std::exchange(last_, Message{stamp, then});
-  const Duration by = before ? (stamp - before->stamp) - (then - before->then) : Duration(0);
+void StampSteps::note(Time stamp, Time arrived) {
+  if (last_ && arrived - last_->arrived > memory) interrupt();
+  const Duration delay = arrived - stamp - correction_;
+  const auto before = std::exchange(last_, Message{stamp, arrived});
+  const Duration by = before ? (stamp - before->stamp) - (arrived - before->arrived) : Duration(0);
   const double size = std::abs(to_seconds(by)), least = std::max(to_seconds(least_step), beyond_scatter * scatter_);
   // What was queued arrives late and then at once, in its order. Stamps that go on are none of a clock that was set back.
   const bool jumps = size > least && (by > Duration(0) || stamp < before->stamp);
@@ -53,11 +63,11 @@ void StampSteps::note(Time stamp, Time arrived, Duration set_ahead) {
     return;
   }
   if (jumps && delays_.size() >= fewest_delays && std::abs(to_seconds(delay - median_of(delays_))) > least) {
-    jump_ = Jump{by, arrived, {delay}};
+    jump_ = Jump{by, arrived, *before, {delay}};
     return;
   }
   scatter_ += (std::min(size, least) - scatter_) / static_cast<double>(most_delays);
-  least_ = std::min(least_.value_or(delay), delay);
+  least_.add(arrived, delay);
   delays_.push_back(delay);
   if (delays_.size() > most_delays) delays_.pop_front();
 }
@@ -68,7 +78,8 @@ void StampSteps::conclude() {
   const Jump jump = *std::exchange(jump_, std::nullopt);
   const Duration now = median_of(jump.delays), change = now - median_of(delays_);
   const Duration tolerance(static_cast<Duration::rep>(tolerated_share * static_cast<double>(std::chrono::abs(jump.by).count())));
-  const bool may_be = jump.by < Duration(0) || now < *least_ - least_step / 2;
+  const bool is_sooner = now < least_.value() - least_step / 2 && (least_.observed() > long_enough || -change > longest_queue);
+  const bool may_be = jump.by < Duration(0) || is_sooner;
   const bool is_step = may_be && std::chrono::abs(change + jump.by) < tolerance;
   if (is_step) {
     correction_before_ = std::exchange(correction_, correction_ + change);

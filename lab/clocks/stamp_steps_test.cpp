@@ -75,5 +75,11 @@ TEST(StampSteps, AreNoneOfABacklogThatIsDropped) {
   EXPECT_EQ((Stream{.waits = backlog, .is_lost = [](double t) { return t > 4 && t < 5; }}.after().count()), 0);
 }
 
+// What waits in the first second and is dropped then: sooner than ever is little after a second.
+TEST(StampSteps, AreNoneOfABusyStart) {
+  const auto busy = [](double t) { return t < 1 ? 0.3 : 0; };
+  EXPECT_EQ((Stream{.waits = busy, .is_lost = [](double t) { return t > 0.7 && t < 1; }}.after().count()), 0);
+}
+
 }  // namespace stamp_steps_test
 }  // namespace kilvo::lab

@@ -92,7 +92,7 @@ std::optional<Measurement> RecordingSource::next() {
     }
     clocks_.note(*measurement, message_->time);
     held_.push_back({*std::move(measurement), message_->time});
-    if (held_.size() == most_held || message_->time - held_.front().recorded > longest_held) clocks_.give_up();
+    if (held_.size() == most_held || message_->time - held_.front().recorded > longest_held) clocks_.wait_no_longer();
   }
   if (held_.empty()) return std::nullopt;
   Measurement out = std::move(held_.front().measurement);
