@@ -128,6 +128,7 @@ std::optional<WorldMap::Attempt> WorldMap::explain(LidarPipeline& lidar, const S
 }
 
 Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, History& history, Estimate& prior, PointDrops& drops) {
+  const auto before = is_anew_ && surfaces_.empty() ? std::optional(error_) : std::nullopt;
   begin_frame_at(prior);
   const Estimate predicted = prior;
   Registration out;
@@ -170,6 +171,8 @@ Registration WorldMap::register_sweep(LidarPipeline& lidar, const Sweep& sweep, 
     usual_motion_.turned2 += (motion.turned2 - usual_motion_.turned2) / PredictionCheck::remembered;
     usual_motion_.pushed2 += (motion.pushed2 - usual_motion_.pushed2) / PredictionCheck::remembered;
   }
+  // A frame begins with a sweep that is used.
+  if (out.refused && before) error_ = *before;
   prediction_.learn(predicted, out, error_at(predicted.x.pose()));
   return out;
 }

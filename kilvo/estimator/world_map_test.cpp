@@ -88,6 +88,23 @@ TEST(WorldMap, BegunAnewItBeginsAFrameWithItsFirstSweep) {
   EXPECT_EQ(e.P, P) << "the second sweep";
 }
 
+TEST(WorldMap, ASweepThatIsRefusedBeginsNoFrame) {
+  Estimate e = floor_sweep().posterior;
+  e.x.g = {0, 0, -standard_gravity};
+  e.P.diagonal().segment<3>(at::p).setConstant(10.0 * 10.0);
+  WorldMap map = empty_world();
+  map.begin_anew(e);
+  LidarPipeline lidar(LidarMount{}, LidarConfig{}, UpdateConfig{}, 1);
+  History history{EstimatorConfig()};
+  history.begin(e, std::nullopt);
+  PointDrops drops;
+  for (int k = 0; k < 3; ++k) {
+    Estimate prior = e;
+    EXPECT_EQ(map.register_sweep(lidar, {LidarScan{}, e.t}, history, prior, drops).refused, Reason::no_usable_point);
+  }
+  EXPECT_NEAR(map.error_at(e.x.pose())(3, 3), 5.0 * 5.0, 1e-3);
+}
+
 // The new map's planes carry that error: however many sweeps are registered to them, they tell nothing of the one before.
 TEST(WorldMap, WhatIsRegisteredToANewMapStaysAsUncertainAsThat) {
   WorldMap map = empty_world();

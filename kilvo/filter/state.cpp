@@ -44,6 +44,7 @@ void begin_frame(Estimate& e) {
   T.block<3, 3>(at::v, at::R) = -up_W.cross(e.x.v) * heading;
   for (const int foot : {0, 1}) {
     const int pc = foot == 0 ? at::pcl : at::pcr;
+    if (e.P.block<3, 3>(pc, pc).isZero(0)) continue;  // it does not stand
     T.block<3, 3>(pc, at::p) = -Eigen::Matrix3d::Identity();
     T.block<3, 3>(pc, at::R) = -up_W.cross(e.x.pc[static_cast<std::size_t>(foot)] - e.x.p) * heading;
   }

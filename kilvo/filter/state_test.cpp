@@ -84,6 +84,17 @@ TEST(State, AFrameThatBeginsHereKnowsHeadingAndPosition) {
   }
 }
 
+TEST(State, AFootThatDoesNotStandStaysOutOfAFrameThatBegins) {
+  test::Random random(5);
+  Estimate e;
+  e.x = test::random_state(random);
+  e.P.topLeftCorner<9, 9>().setIdentity();
+  e.P.block<3, 3>(at::pcr, at::pcr).setIdentity();
+  begin_frame(e);
+  EXPECT_TRUE((e.P.middleRows<3>(at::pcl).isZero(0)));
+  EXPECT_GT((e.P.block<3, 3>(at::pcr, at::pcr).norm()), 1);
+}
+
 TEST(State, ANonFiniteNumberAnywhereIsFound) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(is_finite(Estimate{}));
