@@ -375,6 +375,12 @@ TEST(Doctor, AJointOfAnotherZeroIsNamed) {
   EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("joint_offset"));
 }
 
+TEST(Doctor, AnEncoderThatHasCountedATurnTooManyIsRight) {
+  Recorded recorded = walked().recorded;
+  for (LegSample& s : recorded.legs) s.position[1] -= 6.2831853;
+  EXPECT_THAT(causes(recorded, walked().robot), testing::IsEmpty());
+}
+
 TEST(Doctor, AJointOfAZeroThatIsSomeDegreesOffIsNamedAndNoTurnedImu) {
   for (const auto& [joint, degrees] :
        {std::pair("left_knee_joint", 6.0), {"right_hip_pitch_joint", 6.0}, {"left_hip_roll_joint", -7.0}, {"left_hip_yaw_joint", 8.0}}) {

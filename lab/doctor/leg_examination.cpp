@@ -153,12 +153,13 @@ bool Examination::examine_leg_names() {
           true});
   }
   examine_length_units();
+  constexpr double farthest = 9.5;  // rad: a joint whose encoder has counted a turn too many is within a turn and a half
   double largest = 0;
   std::size_t beyond = 0, count = 0;
   for (const LegSample& s : recorded_.legs) {
     for (const double q : s.position) {
       largest = std::max(largest, std::abs(q));
-      beyond += std::abs(q) > 6.4 ? 1 : 0;
+      beyond += std::abs(q) > farthest ? 1 : 0;
       ++count;
     }
   }
@@ -167,7 +168,7 @@ bool Examination::examine_leg_names() {
     find({Sensor::legs,
           "joint_unit",
           "the joint positions are in degrees, not in radians",
-          fmt::format("{:.0f} % of them are beyond a whole turn of 2 pi, the largest is {:.0f}",
+          fmt::format("{:.0f} % of them are beyond a turn and a half, the largest is {:.0f}",
                       100.0 * static_cast<double>(beyond) / static_cast<double>(count), largest),
           "the driver must publish radians",
           largest,
