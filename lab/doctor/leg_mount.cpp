@@ -175,7 +175,11 @@ void Examination::examine_leg_rotation() {
     return;
   }
   if (stances.good) {
-    adopt(stances.R_link_imu.inverse(), stances.rotation_sigma, stances.offset, stances.offset_sigma, fit);
+    const SO3 by_stances = stances.R_link_imu.inverse();
+    const Eigen::Vector3d of_turning = (fit.rotation_sigma().array().square() + std::pow(method / degrees(1), 2)).sqrt();
+    const Eigen::Vector3d sigma =
+        fit.fit.good ? sigma_beside(by_stances, stances.rotation_sigma, fit.R, of_turning) : stances.rotation_sigma;
+    adopt(by_stances, sigma, stances.offset, stances.offset_sigma, fit);
     constexpr double stance_method = 0.2, if_hardly_turned = 0.5, stance_clock_method = 0.0004;  // degrees, degrees, s
     method = legs_turned() ? stance_method : if_hardly_turned;
     clock_method = stance_clock_method;

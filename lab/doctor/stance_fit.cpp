@@ -64,6 +64,14 @@ StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesi
   return out;
 }
 
+Eigen::Vector3d sigma_beside(const SO3& first, const Eigen::Vector3d& sigma, const SO3& second, const Eigen::Vector3d& second_sigma) {
+  constexpr double usual = 2, elsewhere = 0.35;  // standard deviations; rad: one of them has begun with another mount
+  const Eigen::Array3d apart = (first * second.inverse()).Log().array().abs();
+  if (apart.maxCoeff() > elsewhere) return sigma;
+  const Eigen::Array3d excess = (apart - usual * (sigma.array().square() + second_sigma.array().square()).sqrt()).max(0);
+  return (sigma.array().square() + excess.square()).sqrt();
+}
+
 Standing standing_time(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
                        double offset) {
   return Stances(legs, robot, hypothesis, way, gyro, offset, false).standing();

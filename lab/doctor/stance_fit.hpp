@@ -40,6 +40,10 @@ struct StanceFreedom {
 StanceFit fit_stances(RecordedLegs& legs, const Robot& robot, const LegHypothesis* hypothesis, const LidarWay& way, const GyroPath& gyro,
                       double offset, const StanceFreedom& free = {});
 
+/// Standard deviations (rad, by axis) of the first of two measurements of a mount, where both methods may err: larger by what it is farther
+/// from the second than both are uncertain by. Soles that roll on the spot take the fit of the stances elsewhere than the turning.
+Eigen::Vector3d sigma_beside(const SO3& first, const Eigen::Vector3d& sigma, const SO3& second, const Eigen::Vector3d& second_sigma);
+
 struct Standing {
   std::array<double, 2> of{};  // s, by foot, in which its sole stands while the robot moves
   double moving = 0;           // s, in which the robot moves

@@ -231,5 +231,14 @@ TEST(RobustFit, IsTheSameByDerivativesAsByDifferences) {
   EXPECT_LT((fit.cov - by_differences.cov).norm(), 1e-3 * by_differences.cov.norm());
 }
 
+TEST(StanceFit, IsAsUncertainAsItIsFarFromTheTurning) {
+  const SO3 by_stances = SO3::Exp({0, 0.12, 0}), by_turning = SO3::Exp({0.01, -0.04, 0});
+  const Eigen::Vector3d sigma(0.01, 0.01, 0.01), of_turning(0.02, 0.02, 0.02);
+  const Eigen::Vector3d beside = sigma_beside(by_stances, sigma, by_turning, of_turning);
+  EXPECT_NEAR(beside.x(), 0.01, 1e-6) << "they agree";
+  EXPECT_NEAR(beside.y(), 0.16 - 2 * std::hypot(0.01, 0.02), 1e-3);
+  EXPECT_EQ(sigma_beside(by_stances, sigma, SO3::Exp({0, 1.5, 0}), of_turning), sigma) << "another start";
+}
+
 }  // namespace stance_fit_test
 }  // namespace kilvo::lab
