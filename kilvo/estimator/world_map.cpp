@@ -193,8 +193,7 @@ void WorldMap::begin_anew(const Estimate& e) {
   surfaces_ = VoxelMap(config_);
   prediction_ = {};
   is_anew_ = true;
-  // The robot may be anywhere within these.
-  constexpr double moved = 5.0, climbed = 1.0, turned = 0.5;  // m, m, rad
+  constexpr double moved = 5.0, climbed = 1.0, turned = 0.5;  // m, m, rad: the robot may be anywhere within these
   PoseCovariance unknown = PoseCovariance::Zero();
   const Eigen::Vector3d up_I = e.x.R.matrix().transpose() * -e.x.g.normalized();
   unknown.topLeftCorner<3, 3>() = turned * turned * up_I * up_I.transpose();

@@ -38,15 +38,13 @@ void begin_frame(Estimate& e) {
   const Eigen::Vector3d up_W = -e.x.g.normalized(), up_I = e.x.R.inverse() * up_W;
   // How the errors in the new frame depend on those in the old one: that of the heading turns the velocity and carries the feet along.
   Covariance T = Covariance::Identity();
-  const Eigen::RowVector3d heading = up_I.transpose();
-  T.block<3, 3>(at::R, at::R) -= up_I * heading;
+  T.block<3, 3>(at::R, at::R) -= up_I * up_I.transpose();
   T.block<3, 3>(at::p, at::p).setZero();
-  T.block<3, 3>(at::v, at::R) = -up_W.cross(e.x.v) * heading;
-  for (const int foot : {0, 1}) {
-    const int pc = foot == 0 ? at::pcl : at::pcr;
+  T.block<3, 3>(at::v, at::R) = -up_W.cross(e.x.v) * up_I.transpose();
+  for (const int pc : {at::pcl, at::pcr}) {
     if (e.P.block<3, 3>(pc, pc).isZero(0)) continue;  // it does not stand
     T.block<3, 3>(pc, at::p) = -Eigen::Matrix3d::Identity();
-    T.block<3, 3>(pc, at::R) = -up_W.cross(e.x.pc[static_cast<std::size_t>(foot)] - e.x.p) * heading;
+    T.block<3, 3>(pc, at::R) = -up_W.cross(e.x.pc[pc == at::pcr ? 1 : 0] - e.x.p) * up_I.transpose();
   }
   e.P = (T * e.P * T.transpose()).eval();
   e.P = (0.5 * (e.P + e.P.transpose())).eval();
@@ -65,8 +63,7 @@ bool is_plausible(const Estimate& e) {
 }
 
 bool is_definite(const Covariance& P) {
-  constexpr double rounding = 1e-9;
-  return P.ldlt().vectorD().minCoeff() > -rounding;
+  return P.ldlt().vectorD().minCoeff() > -1e-9;  // rounding
 }
 
 }  // namespace kilvo
