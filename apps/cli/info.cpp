@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "apps/cli/exit_code.hpp"
+#include "apps/cli/joint_advice.hpp"
 #include "apps/cli/sensor_choice.hpp"
 #include "apps/cli/shipped_config.hpp"
 #include "apps/cli/verbs.hpp"
@@ -101,8 +102,8 @@ void print_joints(const InfoOptions& options, const lab::Settings& settings, con
   }
   fmt::print("joints: {} of the {} between {} and the feet in {} are in {}\n", needed.size() - missing.size(), needed.size(),
              robot.imu.link, settings.urdf_file, settings.topic(Sensor::legs));
-  for (const std::string& joint : missing)
-    fmt::print("  {} is not in the messages, nearest is {}; robot.locked_joints if it does not move\n", joint, lab::nearest(joint, names));
+  for (const std::string& joint : missing) fmt::print("  {} is not in the messages, nearest is {}\n", joint, lab::nearest(joint, names));
+  if (!missing.empty()) fmt::print("  {}\n", joint_advice(robot, names));
 }
 
 int info(const InfoOptions& options) {

@@ -8,6 +8,7 @@
 
 #include "apps/cli/exit_code.hpp"
 #include "apps/cli/interrupt.hpp"
+#include "apps/cli/joint_advice.hpp"
 #include "apps/cli/known_description.hpp"
 #include "apps/cli/level_files.hpp"
 #include "apps/cli/make_estimator.hpp"
@@ -189,7 +190,8 @@ class Run {
     const auto why = estimator_.mismatch(*joints);
     legs_seen_ = !why;
     if (why && ++foreign_legs_ == 20)  // messages
-      throw lab::ConfigError(fmt::format("{}: {} (topic {})", facts_.config_file, *why, source_.topic(Sensor::legs)));
+      throw lab::ConfigError(fmt::format("{}: {} (topic {}); {}", facts_.config_file, *why, source_.topic(Sensor::legs),
+                                         joint_advice(settings_.robot, joints->names)));
   }
 
   void keep(std::vector<Output>& outputs) {

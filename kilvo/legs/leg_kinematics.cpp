@@ -114,8 +114,7 @@ std::optional<Eigen::Vector3d> LegKinematics::Chains::force_on(std::size_t side,
   }
   JJ.diagonal().array() += 1e-6;  // a straight leg carries along itself without effort, m^2
   const Eigen::Vector3d force = -JJ.ldlt().solve(Jt);
-  if (!force.allFinite()) return std::nullopt;
-  return T_IL.R * force;
+  return force.allFinite() ? std::optional<Eigen::Vector3d>(T_IL.R * force) : std::nullopt;
 }
 
 LegKinematics::LegKinematics(const Robot& robot, bool forces, const LinkTree* tree) : chains_(std::make_unique<Chains>()) {
@@ -133,6 +132,7 @@ LegKinematics::LegKinematics(const Robot& robot, bool forces, const LinkTree* tr
     if (foot.sole.empty() || foot.sole.size() > max_corners)
       throw std::invalid_argument("robot.feet: the sole of " + foot.name + " needs 1 to " + std::to_string(max_corners) + " points");
     c.legs[side] = (tree == nullptr ? *own : *tree).chain(robot.imu.link, foot.link);
+    if (c.legs[side].names.empty()) throw std::invalid_argument("robot.feet: no joint of the URDF moves link " + foot.link);
   }
 }
 

@@ -156,6 +156,13 @@ TEST(LegKinematics, ALockedJointStaysAtZeroWhateverTheMessageSays) {
   EXPECT_LT(distance(with, feet_of(locked, s)), 1e-12) << "it need not be in the message";
 }
 
+TEST(LegKinematics, ALegWithoutAJointThatMovesIsRefused) {
+  test::Random random(5);
+  Robot robot = test::biped(random);
+  robot.feet[1].link = robot.imu.link;
+  EXPECT_THROW(LegKinematics{robot}, std::invalid_argument);
+}
+
 TEST(LegKinematics, AReadingOfAJointUndoesWhatTheDriverDoes) {
   test::Random random(12);
   Robot robot = test::biped(random);

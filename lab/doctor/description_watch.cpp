@@ -23,21 +23,13 @@ constexpr double lidar_silent = 2;                     // s, after which nothing
 
 // What the estimator finds and corrects by itself, or only becomes less accurate by, is a warning.
 bool spoils(const Finding& finding) {
-  constexpr std::array<std::string_view, 29> always{"accel_frozen",   "joint_slip",
-                                                    "imu_axes",       "imu_rotated",
-                                                    "gyro_unit",      "joint_unit",
-                                                    "joints_swapped", "joint_names_shifted",
-                                                    "joint_sign",     "point_times_reversed",
-                                                    "lidar_inverted", "lidar_unit",
-                                                    "imu_link",       "joint_offset",
-                                                    "lidar_axes",     "accel_gravity",
-                                                    "urdf",           "point_times_unit",
-                                                    "leg_joints",     "sole_unit",
-                                                    "joint_velocity", "foot_link",
-                                                    "joint_frozen",   "joints_repeated",
-                                                    "gyro_frozen",    "gyro_bias",
-                                                    "joint_locked",   "lidar_range",
-                                                    "clouds_deskewed"};
+  constexpr std::array<std::string_view, 31> always{
+      "accel_frozen",   "joint_slip",       "joint_fixed",    "joint_names",         "imu_axes",       "imu_rotated",
+      "gyro_unit",      "joint_unit",       "joints_swapped", "joint_names_shifted", "joint_sign",     "point_times_reversed",
+      "lidar_inverted", "lidar_unit",       "imu_link",       "joint_offset",        "lidar_axes",     "accel_gravity",
+      "urdf",           "point_times_unit", "leg_joints",     "sole_unit",           "joint_velocity", "foot_link",
+      "joint_frozen",   "joints_repeated",  "gyro_frozen",    "gyro_bias",           "joint_locked",   "lidar_range",
+      "clouds_deskewed"};
   constexpr double lidar_turn = 3, imu_turn = 6, time = 0.08, length = 0.2, place = 0.05;  // degrees, s, -, m
   if (std::ranges::find(always, finding.cause) != always.end()) return true;
   if (finding.cause == "accel_unit" || finding.cause == "joints_jump") return finding.fatal;

@@ -122,7 +122,9 @@ class Examination {
   bool examine_joint_values();
   void find_joint_slip();
   bool joints_jump();
+  bool find_other_names(const std::string& evidence);
   void examine_locked_joints();
+  bool examine_fixed_joints();
   /// Legs that hardly turn show how they bend, not how they are mounted.
   bool legs_turned() const;
   bool feet_stand() const;

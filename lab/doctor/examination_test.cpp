@@ -375,6 +375,28 @@ TEST(Doctor, AJointOfAnotherZeroIsNamed) {
   EXPECT_THAT(causes(recorded, walked().robot), ElementsAre("joint_offset"));
 }
 
+TEST(Doctor, AJointThatIsFixedInTheUrdfAndTurnsIsNamed) {
+  Robot robot = walked().robot;
+  const std::size_t knee = robot.urdf.find("\"left_knee_joint\""), type = robot.urdf.find("revolute", knee);
+  ASSERT_LT(type, robot.urdf.size());
+  robot.urdf.replace(type, std::string("revolute").size(), "fixed");
+  const Diagnosis diagnosis = Examination(walked().recorded, robot).run();
+  ASSERT_EQ(diagnosis.findings.size(), 1U);
+  EXPECT_EQ(diagnosis.findings[0].cause, "joint_fixed");
+  EXPECT_THAT(diagnosis.findings[0].text, testing::HasSubstr("left_knee_joint"));
+  EXPECT_THAT(diagnosis.findings[0].changes, testing::IsEmpty());
+}
+
+TEST(Doctor, JointsOfOtherNamesInTheMessagesAreNamedAndMended) {
+  Recorded recorded = walked().recorded;
+  for (std::string& name : recorded.joint_names) name = "robot/" + name;
+  const Diagnosis diagnosis = Examination(recorded, walked().robot).run();
+  ASSERT_EQ(diagnosis.findings.size(), 1U);
+  EXPECT_EQ(diagnosis.findings[0].cause, "joint_names");
+  ASSERT_EQ(diagnosis.findings[0].changes.size(), 1U);
+  EXPECT_THAT(diagnosis.findings[0].changes[0].value, testing::HasSubstr("\"left_knee_joint\": {\"from\": \"robot/left_knee_joint\"}"));
+}
+
 TEST(Doctor, AnEncoderThatHasCountedATurnTooManyIsRight) {
   Recorded recorded = walked().recorded;
   for (LegSample& s : recorded.legs) s.position[1] -= 6.2831853;

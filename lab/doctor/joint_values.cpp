@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 #include <fmt/format.h>
 #include <map>
+#include <regex>
 
 #include "kilvo/math/running_statistics.hpp"
 #include "lab/doctor/examination.hpp"
@@ -55,6 +56,29 @@ double seconds_stuck(const std::vector<LegSample>& legs, std::size_t joint, cons
   return stuck;
 }
 
+// Standard deviation of a joint's position, rad.
+double spread_of(const std::vector<LegSample>& legs, std::size_t joint) {
+  RunningStatistics out(0, 0, 0, INFINITY);
+  for (const LegSample& s : legs) {
+    if (joint < s.position.size()) out.add(s.position[joint], 1);
+  }
+  return out.sigma();
+}
+
+// Those of these names that are fixed turn instead.
+std::string with_joints_that_turn(const std::string& urdf, const std::vector<std::string>& names) {
+  std::string out = urdf;
+  const std::regex name("\\sname\\s*=\\s*[\"']([^\"']+)[\"']"), fixed("\\stype\\s*=\\s*[\"']fixed[\"']");
+  for (std::size_t at = 0; (at = out.find("<joint", at)) != std::string::npos; ++at) {
+    const std::size_t end = std::min(out.find('>', at), out.size());
+    const std::string tag = out.substr(at, end - at);
+    std::smatch found;
+    if (!std::regex_search(tag, found, name) || std::ranges::find(names, found[1].str()) == names.end()) continue;
+    out.replace(at, end - at, std::regex_replace(tag, fixed, " type=\"revolute\""));
+  }
+  return out;
+}
+
 bool same_values(const std::vector<LegSample>& legs, std::size_t a, std::size_t b) {
   return std::ranges::all_of(legs,
                              [&](const LegSample& s) { return s.position.size() <= std::max(a, b) || s.position[a] == s.position[b]; });
@@ -72,15 +96,13 @@ void Examination::examine_locked_joints() {
   double most = 0;
   for (const std::string& joint : robot_.locked_joints) {
     const auto i = static_cast<std::size_t>(std::ranges::find(recorded_.joint_names, joint) - recorded_.joint_names.begin());
-    RunningStatistics of_joint(0, 0, 0, INFINITY);
-    for (const LegSample& s : recorded_.legs)
-      if (i < s.position.size()) of_joint.add(s.position[i], 1);
-    if (std::ranges::find(joints, i) == joints.end() || of_joint.sigma() < 0.5 * turns) {
+    const double spread = spread_of(recorded_.legs, i);
+    if (std::ranges::find(joints, i) == joints.end() || spread < 0.5 * turns) {
       kept.push_back(joint);
       continue;
     }
     moved += (moved.empty() ? "" : ", ") + joint;
-    most = std::max(most, of_joint.sigma());
+    most = std::max(most, spread);
   }
   if (moved.empty()) return;
   robot_.locked_joints = kept;
@@ -94,6 +116,33 @@ void Examination::examine_locked_joints() {
         "rad",
         {{"robot.locked_joints", list}},
         true});
+}
+
+// A joint that the URDF has as fixed (a waist that can be locked, a description that was made simpler for training), and turns. False: it
+// is a joint of the legs, which cannot be judged then.
+bool Examination::examine_fixed_joints() {
+  Robot free = robot_;
+  free.urdf = with_joints_that_turn(robot_.urdf, recorded_.joint_names);
+  if (free.urdf == robot_.urdf) return true;
+  const std::vector<std::size_t> described = recorded_legs_.joints_that_matter(robot_);
+  std::string turning;
+  double most = 0;
+  for (const std::size_t i : recorded_legs_.joints_that_matter(free)) {
+    if (std::ranges::find(described, i) != described.end() || spread_of(recorded_.legs, i) < 0.5 * turns) continue;
+    turning += (turning.empty() ? "" : ", ") + recorded_.joint_names[i];
+    most = std::max(most, spread_of(recorded_.legs, i));
+  }
+  if (turning.empty()) return true;
+  find({Sensor::legs,
+        "joint_fixed",
+        fmt::format("fixed in the URDF, and they turn: {}", turning),
+        fmt::format("standard deviation of up to {:.2f} rad in the messages", most),
+        "robot.urdf: the URDF of the robot as it is built, in which they are revolute",
+        most,
+        "rad",
+        {},
+        true});
+  return false;
 }
 
 // A second publisher on the topic (the zeros of a joint_state_publisher, a simulation beside the robot), or an encoder that fails. Not of

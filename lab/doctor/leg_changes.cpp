@@ -3,8 +3,10 @@
 #include <cmath>
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "lab/doctor/examination.hpp"
+#include "lab/doctor/joint_names.hpp"
 #include "lab/doctor/leg_hypotheses.hpp"
 
 namespace kilvo::lab {
@@ -46,11 +48,15 @@ std::vector<Change> changes_of(RecordedLegs& legs, const Robot& robot, const Leg
     reading.zero += reading.sign * zero;
     reading.sign *= direction > 0 ? 1 : -1;
   }
+  return {change_of(readings)};
+}
+
+Change change_of(const std::map<std::string, JointReading>& readings) {
   std::string value;
   for (const auto& [joint, reading] : readings) {
     if (reading != JointReading{}) value += fmt::format("{}{}: {}", value.empty() ? "" : ", ", quoted(joint), text_of(reading));
   }
-  return {{"robot.joints", "{" + value + "}"}};
+  return {"robot.joints", "{" + value + "}"};
 }
 
 std::string feet_text(const std::array<Foot, 2>& feet) {
@@ -92,6 +98,37 @@ void Examination::find_on_legs(Finding f, const LegHypothesis& h) {
     }
   }
   find(std::move(f));
+}
+
+// A driver that names its joints in a style of its own.
+bool Examination::find_other_names(const std::string& evidence) {
+  std::map<std::string, std::string> read;
+  try {
+    read = recorded_legs_.names_of_joints(robot_);
+  } catch (const std::invalid_argument&) {
+    return false;  // the URDF is none
+  }
+  std::map<std::string, JointReading> readings = robot_.joints;
+  std::vector<std::string> wanted;
+  for (const auto& [joint, name] : read) wanted.push_back(name);
+  const std::map<std::string, std::string> names = matching_names(wanted, recorded_.joint_names);
+  if (names.empty()) return false;
+  for (const auto& [joint, name] : read) {
+    if (const auto other = names.find(name); other != names.end()) readings[joint].from = other->second;
+  }
+  robot_.joints = readings;
+  const Change change = change_of(readings);
+  find({Sensor::legs,
+        "joint_names",
+        fmt::format("the messages name {} of the {} joints of the legs otherwise than the URDF: {} is {} there", names.size(), read.size(),
+                    names.begin()->first, names.begin()->second),
+        evidence,
+        fmt::format("{}: {}", change.key, change.value),
+        0,
+        "",
+        {change},
+        true});
+  return true;
 }
 
 }  // namespace kilvo::lab

@@ -177,7 +177,7 @@ bool Examination::examine_leg_names() {
           true});
   }
   std::string why;
-  if (recorded_legs_.path(robot_, nullptr, 0.2, &why).empty()) {
+  if (recorded_legs_.path(robot_, nullptr, 0.2, &why).empty() && !find_other_names(why)) {
     find({Sensor::legs,
           "urdf",
           fmt::format("the messages of the legs do not fit the URDF: {}", why),
@@ -200,6 +200,7 @@ void Examination::examine_legs() {
   }
   if (!examine_leg_names()) return;
   examine_locked_joints();
+  if (!examine_fixed_joints()) return;
   stepping_ = stepping_of(legs_under(nullptr));
   if (!examine_joint_values()) return;
   examine_joint_speeds();

@@ -21,6 +21,7 @@ LegHypothesis joined(const LegHypothesis& a, const LegHypothesis& b);
 
 /// robot.joints that does to the messages what the hypothesis does; nothing when it leaves them alone, or is about their unit.
 std::vector<Change> changes_of(RecordedLegs& legs, const Robot& robot, const LegHypothesis& h);
+Change change_of(const std::map<std::string, JointReading>& readings);
 /// As robot.feet has it.
 std::string feet_text(const std::array<Foot, 2>& feet);
 
