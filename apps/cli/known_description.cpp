@@ -82,15 +82,14 @@ void put_taken(std::vector<lab::Change>& changes, const std::vector<lab::Refinem
   }
 }
 
-}  // namespace
-
-KnownDescription refined(const lab::Settings& settings, const RunOptions& options, const std::filesystem::path& config,
-                         const std::vector<Sensor>& used) {
-  if (!settings.calibration.online) return {};
+// What the first minute says more exactly than the settings of `known` do is added to `to`, its own changes. False where they are wrong
+// otherwise.
+bool refine(const KnownDescription& known, std::vector<lab::Change>& to, const RunOptions& options, const std::filesystem::path& config,
+            std::vector<Sensor> used) {
   if (!options.quiet) fmt::print(stderr, "kilvo: calibrating by the first minute\n");
   constexpr double refined_by = 60;  // s
-  constexpr int most_rounds = 3;
-  KnownDescription known;
+  constexpr int most_rounds = 4;
+  const SO3 as_described = lab::load_settings(config, options.overrides).robot.lidar.T_imu_lidar.R;
   for (int round = 0; round < most_rounds; ++round) {
     const lab::Settings described = mended(known, options, config);
     Measured now = measured(std::nullopt, refined_by, options, described, used, true);
@@ -99,18 +98,49 @@ KnownDescription refined(const lab::Settings& settings, const RunOptions& option
           can_refine_lidar_position(now.refinements, wanted.no_deskew)) {
         lab::RecordingSource source({options.inputs.begin(), options.inputs.end()}, wanted);
         lab::FailingSource failing(source, options.failures, source.begin(), [&source] { return source.recorded(); });
-        refine_lidar_position(now.refinements, settings.robot.lidar.T_imu_lidar.R, described, failing, refined_by);
+        refine_lidar_position(now.refinements, as_described, described, failing, refined_by);
       }
-      put_taken(known.refined, now.refinements);
-      return known;
+      put_taken(to, now.refinements);
+      return true;
     }
-    for (const lab::Finding& f : now.diagnosis.findings) {
-      // That is for the run to find, and to end with. Clocks that the estimator would correct by itself are corrected from the start.
-      if (lab::as_wrong(f, Time{}, 0).spoils || f.changes.empty() || f.cause == "joints_exchanged") return {};
-      lab::put(known.refined, f.changes);
+    // That is for the run to find, and to end with; the LiDAR is measured without legs that are wrong.
+    const auto ends_a_run = [](const lab::Finding& f) {
+      return lab::as_wrong(f, Time{}, 0).spoils || f.changes.empty() || f.cause == "joints_exchanged";
+    };
+    const auto& findings = now.diagnosis.findings;
+    if (std::ranges::any_of(findings, [&](const lab::Finding& f) { return ends_a_run(f) && spoiled_by(f) != Sensor::legs; })) return false;
+    if (std::ranges::any_of(findings, ends_a_run)) {
+      if (!has(used, Sensor::lidar) || std::erase(used, Sensor::legs) == 0) return false;
+      continue;
+    }
+    // Clocks that the estimator would correct by itself are corrected from the start.
+    for (const lab::Finding& f : findings) lab::put(to, f.changes);
+  }
+  return false;
+}
+
+// A run that begins anew does so with the best that its data give: a description of which one part is wrong is seldom exact in the others.
+void refine_mended(KnownDescription& known, const WrongDescription& first, bool clocks_alone, const RunOptions& options,
+                   const std::filesystem::path& config, const std::vector<Sensor>& used) {
+  if (has(used, Sensor::lidar)) {
+    std::vector<Sensor> without_camera = used;
+    std::erase(without_camera, Sensor::camera);
+    KnownDescription exact = known;
+    if (refine(exact, exact.mended, options, config, without_camera)) {
+      known.mended = exact.mended;
+      return;
     }
   }
-  return {};
+  if (!clocks_alone) put_taken(known.mended, measured_after(first, options, mended(known, options, config), used).refinements);
+}
+
+}  // namespace
+
+KnownDescription refined(const lab::Settings& settings, const RunOptions& options, const std::filesystem::path& config,
+                         const std::vector<Sensor>& used) {
+  if (!settings.calibration.online) return {};
+  KnownDescription known;
+  return refine(known, known.refined, options, config, used) ? known : KnownDescription();
 }
 
 KnownDescription next_round(KnownDescription known, const std::vector<WrongDescription>& found, const RunOptions& options,
@@ -146,9 +176,7 @@ KnownDescription next_round(KnownDescription known, const std::vector<WrongDescr
       else if (known.stops(w))
         lab::put(known.mended, w.finding.changes);
     }
-    if (!known.mended.empty() && !clocks_alone) {
-      put_taken(known.mended, measured_after(first, options, mended(known, options, config), used).refinements);
-    }
+    if (!known.mended.empty()) refine_mended(known, first, clocks_alone, options, config, used);
   } else {
     // What is still wrong must stand up to more data as in the first round, but no more settings are changed for it.
     const lab::Diagnosis longer = measured_after(last_of(wrong), options, mended(known, options, config), sound(used, known)).diagnosis;
