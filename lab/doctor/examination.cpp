@@ -171,6 +171,7 @@ Diagnosis Examination::run() {
   examine_upright();
   examine_camera();
   blame_imu_for_all();
+  suspect_locked_joints();
   const bool legs = recorded_.legs.size() >= 100 && robot_.legs.type == "joints";
   const bool open = std::ranges::any_of(diagnosis_.seems_wrong, std::identity());
   // Where no LiDAR's way tells whether the soles stand, their acceleration does.

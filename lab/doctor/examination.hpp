@@ -125,6 +125,7 @@ class Examination {
   bool find_other_names(const std::string& evidence);
   void examine_locked_joints();
   bool examine_fixed_joints();
+  void suspect_locked_joints();
   /// Legs that hardly turn show how they bend, not how they are mounted.
   bool legs_turned() const;
   bool feet_stand() const;

@@ -387,6 +387,17 @@ TEST(Doctor, AJointThatIsFixedInTheUrdfAndTurnsIsNamed) {
   EXPECT_THAT(diagnosis.findings[0].changes, testing::IsEmpty());
 }
 
+TEST(Doctor, WhereLegsDoNotFitLockedJointsAreTheFirstSuspects) {
+  Recorded recorded = walked().recorded;
+  Robot robot = walked().robot;
+  robot.locked_joints = {"left_knee_joint"};
+  for (std::string& name : recorded.joint_names) name += name == "left_knee_joint" ? "_not_measured" : "";
+  const Diagnosis diagnosis = Examination(recorded, robot).run();
+  ASSERT_FALSE(diagnosis.findings.empty());
+  for (const Finding& f : diagnosis.findings)
+    EXPECT_THAT(f.remedy, testing::StartsWith("look first whether these move: robot.locked_joints left_knee_joint; else ")) << f.cause;
+}
+
 TEST(Doctor, JointsOfOtherNamesInTheMessagesAreNamedAndMended) {
   Recorded recorded = walked().recorded;
   for (std::string& name : recorded.joint_names) name = "robot/" + name;

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <map>
 #include <regex>
+#include <stdexcept>
 
 #include "kilvo/math/running_statistics.hpp"
 #include "lab/doctor/examination.hpp"
@@ -116,6 +117,32 @@ void Examination::examine_locked_joints() {
         "rad",
         {{"robot.locked_joints", list}},
         true});
+}
+
+// Joints that nothing measures and that are taken not to move are the first to look at where the legs do not fit.
+void Examination::suspect_locked_joints() {
+  if (robot_.locked_joints.empty() || robot_.urdf.empty() || recorded_.legs.empty()) return;
+  Robot unlocked = robot_;
+  unlocked.locked_joints.clear();
+  std::vector<std::string> locked;
+  try {
+    const auto measured = recorded_legs_.names_of_joints(robot_);
+    for (const auto& [joint, name] : recorded_legs_.names_of_joints(unlocked)) {
+      if (!measured.contains(joint)) locked.push_back(joint);
+    }
+  } catch (const std::invalid_argument&) {
+    return;  // the URDF is none
+  }
+  if (locked.empty()) return;
+  const std::string suspects = fmt::format("look first whether these move: robot.locked_joints {}", fmt::join(locked, ", "));
+  for (Finding& f : diagnosis_.findings) {
+    const bool by_legs = f.sensor == Sensor::legs && !f.cause.ends_with("_clock") && !f.cause.ends_with("_rate");
+    if (by_legs || f.cause.starts_with("imu_mount") || f.cause == "imu_link") f.remedy = suspects + "; else " + f.remedy;
+  }
+  for (Check& c : diagnosis_.checks) {
+    if (c.verdict == Check::Verdict::unknown && (c.sensor == Sensor::legs || c.what.find("mount on the robot") != std::string::npos))
+      c.detail += "; " + suspects;
+  }
 }
 
 // A joint that the URDF has as fixed (a waist that can be locked, a description that was made simpler for training), and turns. False: it

@@ -93,6 +93,8 @@ void check_together(const Settings& s, Problems& problems) {
 
 void check_names(const Settings& s, Problems& problems) {
   if (s.robot.urdf.empty()) return;
+  if (s.robot.urdf.find("<xacro:") != std::string::npos)
+    refuse(s, "robot.urdf", fmt::format("{} is not expanded: xacro FILE.urdf.xacro > FILE.urdf", s.urdf_file));
   const UrdfNames names = find_urdf_names(s.robot.urdf);
   if (names.links.empty()) refuse(s, "robot.urdf", fmt::format("{} has no links: not a URDF file", s.urdf_file));
   // The reader of URDFs descends link by link, and its stack ends at some thousands of them.

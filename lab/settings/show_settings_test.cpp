@@ -171,6 +171,8 @@ TEST_F(UrdfInSettings, AMissingFileIsNamedWithItsSetting) {
   EXPECT_EQ(error_of("robot: {urdf: empty.urdf}"), "no error");
   std::ofstream(folder_ / "text.urdf") << "nothing of the kind";
   EXPECT_THAT(error_of("robot: {urdf: text.urdf}"), HasSubstr("has no links"));
+  std::ofstream(folder_ / "macro.urdf") << R"(<robot><link name="base"/><xacro:leg side="left"/></robot>)";
+  EXPECT_THAT(error_of("robot: {urdf: macro.urdf}"), HasSubstr("macro.urdf is not expanded: xacro"));
 }
 
 TEST_F(UrdfInSettings, AFileThatIsNoConfigurationIsRefused) {
