@@ -37,8 +37,7 @@ void add_children(const urdf::Link& link, const Robot& robot, KDL::Tree& tree) {
     const urdf::Joint& joint = *child->parent_joint;
     const bool locked = std::ranges::find(robot.locked_joints, joint.name) != robot.locked_joints.end();
     const KDL::Segment segment(child->name, to_kdl(joint, locked), to_kdl(joint.parent_to_joint_origin_transform));
-    if (!tree.addSegment(segment, link.name))
-      throw std::invalid_argument("robot.urdf: link " + child->name + " is the child of two joints");
+    if (!tree.addSegment(segment, link.name)) throw std::invalid_argument("robot.urdf: two joints lead to link " + child->name);
     add_children(*child, robot, tree);
   }
 }
