@@ -19,7 +19,7 @@ constexpr int patience = 6;  // as long then
 // What was observed longer ago tells nothing: clocks drift.
 constexpr Duration memory = std::chrono::minutes(1);
 // A jump ahead is a step where messages come sooner than they ever did for so long, or by more than any driver keeps them.
-constexpr Duration long_enough = std::chrono::seconds(3), longest_queue = std::chrono::seconds(10);
+constexpr Duration long_enough = std::chrono::seconds(2), longest_queue = std::chrono::seconds(10);
 // Share of a step by which the delays may differ from it.
 constexpr double tolerated_share = 0.3;
 
