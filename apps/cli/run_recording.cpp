@@ -188,8 +188,7 @@ class Run {
     const auto* joints = std::get_if<JointSample>(&m);
     if (joints == nullptr || joints->position.empty() || legs_seen_) return;
     const auto why = estimator_.mismatch(*joints);
-    legs_seen_ = !why;
-    if (why && ++foreign_legs_ == 20)  // messages
+    if (legs_seen_ = !why; why && ++foreign_legs_ == 20)  // messages
       throw lab::ConfigError(fmt::format("{}: {} (topic {}); {}", facts_.config_file, *why, source_.topic(Sensor::legs),
                                          joint_advice(settings_.robot, joints->names)));
   }
@@ -229,15 +228,14 @@ class Run {
   }
 
   void tell_end() const {
-    const RunSummary& run_summary = files_.run_summary();
+    const RunSummary& summary = files_.run_summary();
     const auto warnings = facts_.sensors.empty() ? facts_.warnings : all_warnings(facts_, source_, estimator_.statistics());
     for (const std::string& text : warnings) fmt::print(stderr, "kilvo: warning: {}\n", text);
     if (!warnings.empty() && !options_.quiet) fmt::print(stderr, "kilvo: what to do about warnings: docs/troubleshooting.md\n");
     if (!facts_.failure.empty()) fmt::print(stderr, "kilvo: error: {}\n", facts_.failure);
     if (options_.quiet) return;
     fmt::print("{}: {} poses, {} sweeps, path {:.2f} m, start to end {:.3f} m, {:.1f} s of data in {:.2f} s\n", options_.out.string(),
-               run_summary.outputs(), run_summary.sweeps(), run_summary.path_length(), run_summary.start_to_end(), run_summary.seconds(),
-               facts_.wall_seconds);
+               summary.outputs(), summary.sweeps(), summary.path_length(), summary.start_to_end(), summary.seconds(), facts_.wall_seconds);
   }
 
   const RunOptions& options_;

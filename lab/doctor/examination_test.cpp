@@ -8,9 +8,7 @@
 #include <random>
 
 #include "lab/doctor/description_watch.hpp"
-#include "lab/settings/settings.hpp"
-#include "lab/simulation/description.hpp"
-#include "lab/simulation/simulator.hpp"
+#include "tests/helpers/walked.hpp"
 
 namespace kilvo::lab {
 namespace examination_test {
@@ -20,44 +18,8 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::Not;
 
-/// 16 s in a room: 3.4 s of standing, then a walk with a turn.
-struct Walked {
-  Recorded recorded;
-  Robot robot;
-  std::vector<Measurement> measurements;
-};
-
-const Walked& walked() {
-  static const Walked walk = [] {
-    SimulatorConfig config;
-    config.duration = 16;
-    config.use = {true, true, true, false};
-    config.lidar.points = 8000;
-    for (const Scenario& scenario : scenarios()) {
-      if (scenario.name != "room") continue;
-      Simulator simulator(scenario, config);
-      Recorder recorder;
-      Walked out;
-      while (auto measurement = simulator.next()) {
-        recorder.push(*measurement);
-        out.measurements.push_back(*std::move(measurement));
-      }
-      out.recorded = recorder.finish();
-      const std::string urdf = std::string(KILVO_SOURCE_DIR) + "/config/robots/sim.urdf";
-      out.robot = parse_settings(simulated_config(config, urdf), "simulated", ".").robot;
-      out.robot.urdf = urdf_of(config.shape);
-      return out;
-    }
-    return Walked{{}, {}, {}};
-  }();
-  return walk;
-}
-
-std::vector<std::string> causes(const Recorded& recorded, const Robot& robot) {
-  std::vector<std::string> out;
-  for (const Finding& finding : Examination(recorded, robot).run().findings) out.push_back(finding.cause);
-  return out;
-}
+using test_walk::causes;
+using test_walk::walked;
 
 void change_points(Recorded& recorded, const std::function<void(Eigen::Vector3f&)>& change) {
   for (Sweep& sweep : recorded.sweeps) {
