@@ -370,6 +370,20 @@ TEST(Doctor, JointsOfOtherNamesInTheMessagesAreNamedAndMended) {
   EXPECT_THAT(diagnosis.findings[0].changes[0].value, testing::HasSubstr("\"left_knee_joint\": {\"from\": \"robot/left_knee_joint\"}"));
 }
 
+// Messages come more often than the encoders are read.
+TEST(Doctor, EncodersThatAreReadSlowlyHaveNotSlipped) {
+  Recorder recorder;
+  std::optional<JointSample> read;
+  for (const Measurement& m : walked().measurements) {
+    const auto* joints = std::get_if<JointSample>(&m);
+    if (joints != nullptr && (!read || joints->t - read->t > std::chrono::milliseconds(39))) read = *joints;
+    Measurement sent = m;
+    if (joints != nullptr) std::get<JointSample>(sent).position = read->position;
+    recorder.push(sent);
+  }
+  EXPECT_THAT(causes(recorder.finish(), walked().robot), Not(Contains("joint_slip")));
+}
+
 TEST(Doctor, AnEncoderThatHasCountedATurnTooManyIsRight) {
   Recorded recorded = walked().recorded;
   for (LegSample& s : recorded.legs) s.position[1] -= 6.2831853;

@@ -202,9 +202,12 @@ bool Examination::joints_jump() {
 
 // An encoder that slips or loses its zero, a gear that jumps a tooth.
 void Examination::find_joint_slip() {
-  constexpr double least = 0.1;       // rad
+  constexpr double least = 0.1;  // rad
+  constexpr std::ptrdiff_t most_steps = 2;
+  constexpr std::size_t most_of_all = 6;
   constexpr double longest = 0.0055;  // s: of slower messages a step of a walk is as large (T1, 50 Hz: 0.5 rad)
   if (!(recorded_.stamps[static_cast<std::size_t>(Sensor::legs)].period < longest)) return;
+  if (recorded_.joint_steps.size() > most_of_all) return;
   std::map<std::size_t, JointStep> sums;
   for (const JointStep& step : recorded_.joint_steps) {
     JointStep& sum = sums.try_emplace(step.joint, JointStep{step.t, step.joint, 0}).first->second;
@@ -212,6 +215,8 @@ void Examination::find_joint_slip() {
   }
   for (const std::size_t joint : recorded_legs_.joints_that_matter(robot_)) {
     const auto sum = sums.find(joint);
+    // What steps again and again is an encoder that is read less often than its messages come.
+    if (std::ranges::count(recorded_.joint_steps, joint, &JointStep::joint) > most_steps) continue;
     if (sum == sums.end() || std::abs(sum->second.size) < least) continue;
     const double size = sum->second.size;
     find({Sensor::legs,

@@ -135,6 +135,8 @@ bool Examination::find_inclined_imu(const MountFit& fit, double method) {
   const Eigen::Vector3d turn = information.ldlt().solve(of_turning * by_turning + of_soles * by_soles);
   const auto off = [](const Eigen::Vector3d& x, const Eigen::Matrix3d& A) { return std::sqrt(x.dot(A * x)); };
   constexpr double inclined = 4, agree = 3;  // degrees; standard deviations
+  // The soles show at least half of it: they say nothing of what is about the vertical.
+  if (by_soles.dot(turn) < 0.5 * turn.squaredNorm()) return false;
   if (degrees(turn.norm()) < inclined || off(turn, information) < sure_among(3)) return false;
   if (off(by_turning - turn, of_turning) > agree || off(by_soles - turn, of_soles) > agree) return false;
   settle_imu_link((SO3::Exp(turn) * described).inverse());
