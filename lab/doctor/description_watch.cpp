@@ -96,7 +96,7 @@ void DescriptionWatch::take(const Measurement& measurement) {
     return;
   }
   const bool is_another = now_.begin && to_seconds(t - *now_.begin) < -backwards;
-  if (is_another) whole_ = empty();
+  if (is_another) whole_ = empty(), gyro_bias_.reset();
   if (!now_.begin || is_another) begin(t);
   last_ = last_ ? std::max(*last_, t) : t;
   if (const auto* imu = std::get_if<ImuSample>(&measurement)) {
@@ -118,6 +118,7 @@ void DescriptionWatch::begin_anew() {
   if (judging_ != Judging::live) collect();
   now_.begin.reset();
   known_.reset();
+  gyro_bias_.reset();
   doubts_.clear();
   phase_ = Phase::first;
   first_ = true;
