@@ -51,6 +51,15 @@ void expect_right(const Result& result) {
   }
 }
 
+void expect_no_step(const std::vector<Robot::Arrival>& arrivals) {
+  SensorClocks clocks;
+  const Result result = result_of(clocks, arrivals, Duration(0));
+  for (const Sensor s : all_sensors) {
+    EXPECT_EQ(clocks.steps(s), 0) << name_of(s);
+    EXPECT_EQ(result.worst[index_of(s)], 0) << name_of(s);
+  }
+}
+
 // Two threads note what arrives, and a cloud waits until the times of its points are understood.
 TEST(SensorClocks, KeepTheirStepsWhereOneMessageIsNotedLate) {
   for (const std::size_t late : {0U, 1U, 2U, 3U}) {
@@ -152,12 +161,7 @@ TEST(SensorClocks, AreNotSetWhereTheImuComesInBurstsAndTheClockOfArrivalIsSet) {
     for (auto& a : arrivals) {
       if (a.at >= day + seconds(5)) a.at += seconds(60);
     }
-    SensorClocks clocks;
-    const Result result = result_of(clocks, arrivals, Duration(0));
-    for (const Sensor s : all_sensors) {
-      EXPECT_EQ(clocks.steps(s), 0) << name_of(s);
-      EXPECT_EQ(result.worst[index_of(s)], 0) << name_of(s);
-    }
+    expect_no_step(arrivals);
   }
 }
 
@@ -174,12 +178,7 @@ TEST(SensorClocks, AreNotSetWhereAllMessagesWaitedAndSomeWereDropped) {
     if (a.at > from && a.at < until) a.at = until + (place += std::chrono::microseconds(50));
   }
   std::ranges::stable_sort(arrivals, {}, &Robot::Arrival::at);
-  SensorClocks clocks;
-  const Result result = result_of(clocks, arrivals, Duration(0));
-  for (const Sensor s : all_sensors) {
-    EXPECT_EQ(clocks.steps(s), 0) << name_of(s);
-    EXPECT_EQ(result.worst[index_of(s)], 0) << name_of(s);
-  }
+  expect_no_step(arrivals);
 }
 
 TEST(SensorClocks, OfARecordingThatIsPlayedAgainAreItsOwn) {
@@ -205,7 +204,7 @@ TEST(SensorClocks, OfAnotherRecordingAreForgotten) {
   robot.length = seconds(10);
   auto arrivals = robot.arrivals();
   for (auto& a : arrivals) {
-    if (a.m.index() == 1 && a.measured > day + seconds(5)) std::visit([](auto& x) { x.t += milliseconds(150); }, a.m);
+    if (a.m.index() == 1 && a.measured > day + seconds(5)) set_ahead(a.m, milliseconds(150));
   }
   SensorClocks clocks;
   result_of(clocks, arrivals, Duration(0));
@@ -225,12 +224,7 @@ TEST(SensorClocks, AreNotSetWhereTheImuComesLateForAWhile) {
       if (a.m.index() == 0 && a.measured > day + seconds(4) && a.measured < day + seconds(5)) a.at += milliseconds(late);
     }
     std::ranges::stable_sort(arrivals, {}, &Robot::Arrival::at);
-    SensorClocks clocks;
-    const Result result = result_of(clocks, arrivals, Duration(0));
-    for (const Sensor s : all_sensors) {
-      EXPECT_EQ(clocks.steps(s), 0) << name_of(s);
-      EXPECT_EQ(result.worst[index_of(s)], 0) << name_of(s);
-    }
+    expect_no_step(arrivals);
   }
 }
 
@@ -260,7 +254,7 @@ TEST(SensorClocks, OfTheLegsAreNotJudgedWhileTheImuIsSilent) {
   auto arrivals = robot.arrivals();
   std::erase_if(arrivals, [](const auto& a) { return a.m.index() == 0 && a.measured > day + seconds(4) && a.measured < day + seconds(8); });
   for (auto& a : arrivals) {
-    if (a.m.index() == 1 && a.measured > day + seconds(5)) std::visit([](auto& x) { x.t += milliseconds(150); }, a.m);
+    if (a.m.index() == 1 && a.measured > day + seconds(5)) set_ahead(a.m, milliseconds(150));
   }
   SensorClocks clocks;
   for (const auto& a : arrivals) {

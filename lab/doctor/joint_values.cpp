@@ -155,9 +155,10 @@ bool Examination::examine_fixed_joints() {
   std::string turning;
   double most = 0;
   for (const std::size_t i : recorded_legs_.joints_that_matter(free)) {
-    if (std::ranges::find(described, i) != described.end() || spread_of(recorded_.legs, i) < 0.5 * turns) continue;
+    const double spread = spread_of(recorded_.legs, i);
+    if (std::ranges::find(described, i) != described.end() || spread < 0.5 * turns) continue;
     turning += (turning.empty() ? "" : ", ") + recorded_.joint_names[i];
-    most = std::max(most, spread_of(recorded_.legs, i));
+    most = std::max(most, spread);
   }
   if (turning.empty()) return true;
   find({Sensor::legs,
